@@ -329,7 +329,7 @@ pub struct FigureSetting {
 }
 
 /// A direction that is drawn as an arrow with its name.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DirectionArrow {
     pub name: &'static str,
     /// Unit vector.

@@ -111,9 +111,12 @@ function line(pen, p, q) {
   pen.stroke();
 }
 
+/// What they are for a leaf: of an instant of a motion the wind may be another.
+const directionsOf = (leaf) => leaf.directions || view.directions;
+
 /// The directions of gravity and wind as arrows of fixed size beside each other, from a corner of the panel on.
-function drawDirections(pen, box, place, [x, y], step) {
-  view.directions.forEach((it, k) => drawDirection(pen, box, place, [x + k * step, y], it));
+function drawDirections(pen, box, place, [x, y], step, leaf) {
+  directionsOf(leaf).forEach((it, k) => drawDirection(pen, box, place, [x + k * step, y], it));
 }
 
 function drawDirection(pen, box, place, at, { name, direction }) {

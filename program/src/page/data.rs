@@ -70,6 +70,9 @@ pub struct PageLeaf {
     /// with the section act on it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loads: Option<Vec<LoadMark>>,
+    /// The directions of weight and wind at its time of a motion, where they are others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub directions: Option<Vec<DirectionArrow>>,
     /// From the mean of the bases to that of the tips.
     #[serde(skip)]
     pub tip_from_base: DVec3,

@@ -124,11 +124,14 @@ pub fn page_data<R: PageResult>(result: &R, scenario: &Scenario) -> PageData {
     let mut view = page_data_without_result(scenario);
     view.summary = result.summary(&scenario.units);
     result.fill_page_data(&mut view, scenario);
+    let setting = FigureSetting::from_scenario(scenario);
     for leaf in &mut view.leaves {
         if let Some(time) = leaf.time {
             leaf.loads = Some(loads_on_drawn_veins(scenario, Some(time)));
+            leaf.directions = Some(setting.direction_arrows(true, time));
         }
         leaf.loads.take_if(|loads| *loads == view.loads);
+        leaf.directions.take_if(|arrows| *arrows == view.directions);
     }
     let tips = view.leaves.iter().map(|leaf| leaf.tip_from_base);
     let oblique = ViewAngles::oblique(tips).toward_viewer();
@@ -181,9 +184,22 @@ pub(crate) fn loads_on_drawn_veins(scenario: &Scenario, time: Option<f64>) -> Ve
     loads
 }
 
-/// A leaf in motion, as centerlines with nodes at these stations, for the page of its scenario.
-pub fn moving_leaf(stations: &[f64], curves: &[Vec<DVec3>], page: &PageData) -> PageLeaf {
-    PageLeaf::from_centerlines(String::new(), stations, curves, page, usize::MAX)
+/// A leaf in motion at this time, as centerlines with nodes at these stations, for the page of its
+/// scenario.
+pub fn moving_leaf(
+    stations: &[f64],
+    curves: &[Vec<DVec3>],
+    page: &PageData,
+    scenario: &Scenario,
+    time: f64,
+) -> PageLeaf {
+    let arrows = FigureSetting::from_scenario(scenario).direction_arrows(true, time);
+    PageLeaf {
+        directions: Some(arrows).filter(|arrows| *arrows != page.directions),
+        loads: Some(loads_on_drawn_veins(scenario, Some(time)))
+            .filter(|loads| *loads != page.loads),
+        ..PageLeaf::from_centerlines(String::new(), stations, curves, page, usize::MAX)
+    }
 }
 
 fn assemble_html(view: &PageData, still: &Drawing) -> String {

@@ -52,6 +52,7 @@ function currentLeaves() {
 /// Brings everything up to date: `again` after a setting has changed.
 function update(again) {
   leaves = currentLeaves();
+  if (leaves.length) showDirections(leaves[0]);
   if (space) space.panels = leaves.map((leaf, i) => ({ leaf, mesh: put(i, leaf, again), label: several ? leaf.label : "" }));
   shown.dirty = true;
   if (again) shown.stale = true;

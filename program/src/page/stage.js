@@ -107,6 +107,13 @@ function redraw() {
   shown.dirty = shown.stale = true;
 }
 
+/// Draws the directions anew where those of a leaf are others than those that are drawn.
+function showDirections(leaf) {
+  const now = JSON.stringify(directionsOf(leaf));
+  if (now !== shown.directions) shown.stale = true;
+  shown.directions = now;
+}
+
 /// Looks from a direction, at all of the box.
 function look(name) {
   const from = { free: view.toward, above: [0, -1e-4, 1], side: [0, -1, 0], front: [1, 0, 0] }[name];
@@ -169,7 +176,7 @@ function frustum(width, height) {
   const { camera, fit } = space;
   const small = space.panels.length > 1;
   // A title stands above a small panel, names of axes below the box of a large one.
-  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 56, 76] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
+  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 76, 70] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
   const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - above - below) / fit[1]);
   camera.right = width / 2 / scale;
   camera.left = -camera.right;
@@ -233,7 +240,7 @@ function drawUnder(width, height, ratio) {
   for (const panel of space.panels) {
     const place = placeIn(panel);
     if (find("axes").checked) drawAxes(pen, space.box, place, small, !small || panel === space.panels[0]);
-    if (panel === space.panels[0]) drawDirections(pen, space.box, place, [44, height - (small ? 46 : 64)], 76);
+    if (panel === space.panels[0]) drawDirections(pen, space.box, place, [44, height - (small ? 46 : 64)], 76, panel.leaf);
     if (panel.label) drawLabel(pen, panel, small);
   }
   const colors = quantity();
