@@ -192,5 +192,5 @@ fn a_page_of_a_motion_knows_the_wind_at_its_times() {
     let blows = |leaf: &serde_json::Value| leaf["directions"].to_string().contains("wind");
     let leaves = page["leaves"].list();
     assert!(!page["directions"].to_string().contains("wind"));
-    assert!(!blows(&leaves[0]) && blows(&leaves[leaves.len() - 1]));
+    assert!(!blows(&leaves[0]) && leaves.iter().any(blows));
 }
