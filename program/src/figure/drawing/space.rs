@@ -752,7 +752,7 @@ mod tests {
                 .map(|k| DVec3::new(f64::from(k) / 8.0, 0.0, 0.0))
                 .chain([DVec3::new(1.1, y, z)])
                 .collect();
-            DrawnVeins::from_curves(&[curve.clone()], &[curve[9]], 1.0)
+            DrawnVeins::from_curves(std::slice::from_ref(&curve), &curve[9..], 1.0)
         };
         let across = [[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1]].map(shape);
         assert_eq!(ViewAngles::telling_apart(&across), FRONT_VIEW);
