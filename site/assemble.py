@@ -17,14 +17,15 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 LINK = re.compile(r"(?<=\]\()([^)#\s]+)((?:#[^)\s]*)?)(?=\))")
 
-# Scenarios of the gallery: what to look at, and the numbers with sliders (key, low, high, logarithmic).
-GALLERY = [
-    ("paper/fig04", "The paper's leaf of 21 veins under its weight", [("scale:stiffness.bending_2", 0.02, 5.0, True)]),
-    ("study/undulation", "A leaf whose margin undulates", [("scale:stiffness.torsion", 0.1, 20.0, True)]),
-    ("measured/grass", "A blade of grass that arches over, in cm", [("scale:section.young", 0.3, 3.0, True)]),
-    ("measured/blade", "A blade from its outline and thickness", [("scale:blade.thickness", 0.5, 2.0, False)]),
-    ("classic/elastica_buckled", "Euler's elastica, far beyond buckling", [("load.tip_force[0]", -20.0, -1.0, False)]),
-]
+# Scenarios of the gallery: what to look at, and the numbers with sliders. Each opens on the page in web/check.mjs.
+GALLERY = json.loads((ROOT / "site/gallery.json").read_text())
+
+# Questions with which the live page begins, by their names in its address.
+QUESTIONS = {
+    "ripple": "Why do leaf margins ripple?",
+    "snap": "Why does it snap?",
+    "arch": "Why does a grass leaf arch and not fall?",
+}
 
 
 def documents(to: Path) -> None:
@@ -85,10 +86,9 @@ def reference(to: Path) -> None:
     (to / "reference.md").write_text("\n".join(lines))
 
 
-def address(scenario: Path, sliders: list[tuple[str, float, float, bool]]) -> str:
+def address(scenario: Path, sliders: list[dict[str, object]]) -> str:
     """The part of an address that holds a scenario, as the live page reads it."""
-    shown = [{"key": key, "low": low, "high": high, "log": log} for key, low, high, log in sliders]
-    held = {"text": scenario.read_text(), "name": scenario.name, "values": [], "sliders": shown, "view": None}
+    held = {"text": scenario.read_text(), "name": scenario.name, "values": [], "sliders": sliders, "view": None}
     packing = zlib.compressobj(9, zlib.DEFLATED, -15)
     packed = packing.compress(json.dumps(held).encode()) + packing.flush()
     return "#s=" + base64.urlsafe_b64encode(packed).decode().rstrip("=")
@@ -101,9 +101,13 @@ def gallery(to: Path, program: str | None) -> None:
     if live.exists():
         shutil.copy(live, to / "live.html")
         lines += ["Each opens [the live page](docs/live.md): one file with the solver in it. Move the slider, and the leaf follows.", ""]
+        lines += ["## Three questions", ""]
+        lines += [f'- <a href="../live.html#q={name}">{question}</a>' for name, question in QUESTIONS.items()]
+        lines += [""]
     else:
         lines += ["[The live page](docs/live.md) was not built with this site.", ""]
-    for name, words, sliders in GALLERY:
+    for entry in GALLERY:
+        name, words, sliders = entry["scenario"], entry["words"], entry["sliders"]
         scenario = ROOT / f"scenarios/{name}.toml"
         lines += [f"## {words}", ""]
         if program is not None:

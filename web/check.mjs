@@ -1,11 +1,12 @@
 // Opens the live page in a browser without a network, and uses it as a reader does:
-//   (cd program/src/page/three && npm ci) && node web/check.mjs
+//   (cd program/src/page/three && npm ci) && node web/check.mjs [CLAIM ...]
 // The browser is Chromium, CHROMIUM or /usr/bin/chromium; WebGL is drawn by swiftshader.
 import assert from "node:assert/strict";
-import { statSync } from "node:fs";
+import { readFileSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
+import { deflateRawSync } from "node:zlib";
 
 const web = dirname(fileURLToPath(import.meta.url));
 const { chromium } = createRequire(join(web, "../program/src/page/three/package.json"))("playwright-core");
@@ -108,7 +109,8 @@ async function flattens(byKeys) {
   await page.waitForFunction(() => document.getElementById("title").textContent === "undulation" && /0.08\d* high/.test(document.getElementById("summary").textContent));
   await page.rest();
   if (byKeys) {
-    await tabTo(page, `${bending}, as a number`);
+    await tabTo(page, "slider-stiffness-bending-2");
+    await page.keyboard.press("Enter");
     await page.keyboard.press("Control+A");
     await page.keyboard.type("10");
     await page.keyboard.press("Enter");
@@ -303,26 +305,150 @@ async function picture() {
   await page.done("picture");
 }
 
+/// The links of the site's gallery, one by one: each opens its leaf with the sliders that are asked for, and each slider moves the leaf.
+async function gallery() {
+  const entries = JSON.parse(readFileSync(join(web, "../site/gallery.json"), "utf8"));
+  for (const { scenario, sliders } of entries) {
+    const name = `${scenario.split("/")[1]}.toml`;
+    const text = readFileSync(join(web, `../scenarios/${scenario}.toml`), "utf8");
+    const held = { text, name, values: [], sliders, view: null };
+    const page = await open(`#s=${deflateRawSync(JSON.stringify(held)).toString("base64url")}`);
+    const shown = await page.evaluate(() => window.leafdyn.sliders.shown.map(({ key, low, high, log }) => ({ key, low, high, log })));
+    assert.deepEqual(shown, sliders, scenario);
+    assert.equal(await page.textContent("#added"), "", scenario);
+    for (const { key, low, high, log } of sliders) {
+      const middle = log ? Math.sqrt(low * high) : 0.5 * (low + high);
+      const before = await page.evaluate(() => window.leafdyn.stage().nodes());
+      await page.evaluate(([key, value]) => window.leafdyn.sliders.set(key, value, true), [key, 0.4 * low + 0.6 * middle]);
+      await page.rest();
+      const after = await page.evaluate(() => window.leafdyn.stage().nodes());
+      const longest = await page.evaluate(() => window.leafdyn.stage().view.longest);
+      const moved = before.length === after.length ? Math.max(...before.map((x, i) => Math.hypot(...x.map((y, k) => y - after[i][k])))) : Infinity;
+      assert(moved > 1e-4 * longest, `${scenario}: ${key} moves the leaf by ${moved}`);
+    }
+    await page.done(`gallery-${scenario.split("/")[1]}`);
+  }
+}
+
+/// The first sliders do something, are found by what they mean, and have one stop of the Tab key each.
+async function firstSliders() {
+  const page = await open();
+  const keys = () => page.evaluate(() => window.leafdyn.sliders.shown.map(({ key }) => key));
+  const first = await keys();
+  assert.equal(first.length, 4);
+  assert(first.includes("load.gravity[2]") && !first.includes("stiffness.torsion"), `${first}`);
+  assert.match(await page.textContent(".slider .words"), /\S/);
+  const stops = await page.evaluate(() => document.querySelectorAll(".slider :is(input, button):not([tabindex='-1'])").length);
+  assert.equal(stops, 4, "stops of the Tab key");
+  const add = async (text) => {
+    await page.fill("#add", text);
+    await page.press("#add", "Enter");
+    return (await keys())[0];
+  };
+  for (const text of ["weight", "twist", "coupling.y"]) assert.match(await add(text), { weight: /load\.g/, twist: /torsion|twist/, "coupling.y": /^coupling\.y$/ }[text]);
+  await page.choose("study/undulation.toml");
+  await page.rest();
+  assert.equal((await keys())[0], "margins");
+  for (const text of ["ripple", "margin"]) assert.equal(await add(text), "margins");
+  assert.equal(await page.inputValue('[aria-label="margins, as a number"]'), "30");
+  // As many per cent as the outermost vein is longer; the others in proportion.
+  await page.evaluate(() => window.leafdyn.sliders.set("margins", 15, true));
+  await page.rest();
+  const values = await page.evaluate(() => Object.fromEntries(window.leafdyn.sliders.values));
+  assert.equal(values["rest.stretch[0]"], 1.15);
+  assert.equal(values["rest.stretch[1]"], 1.096);
+  assert.equal(values["rest.stretch[5]"], 1);
+  assert.equal(await page.inputValue('[aria-label="margins, as a number"]'), "15");
+  await page.done("first-sliders");
+}
+
+/// A leaf that moves is not told as one at rest: its tip is where it is seen, and the numbers at rest are pale.
+async function movesAreTold() {
+  const page = await open();
+  await page.choose("motion/gust.toml");
+  await page.rest();
+  const rest = await page.tip();
+  page.evaluate(() => void window.leafdyn.play(false));
+  await page.waitForFunction(() => /in motion, t = [1-9.]/.test(document.getElementById("found").textContent), null, { timeout: 60000 });
+  await page.waitForTimeout(1500);
+  const told = await page.evaluate(() => ({
+    lamp: document.getElementById("lamp").className,
+    verdict: document.getElementById("verdict").className,
+    past: document.getElementById("summary").classList.contains("past"),
+    row: document.querySelector("#summary tr.now").textContent,
+  }));
+  assert.deepEqual([told.lamp, told.verdict, told.past], ["", "", true]);
+  const tip = told.row.replaceAll("−", "-").match(/-?[\d.]+(?=[,)])/g).map(Number);
+  assert(Math.hypot(...tip.map((x, k) => x - rest[k])) > 1e-3, `${tip} in motion, ${rest} at rest`);
+  await page.evaluate(() => void window.leafdyn.play(false));
+  await page.rest();
+  await page.waitForFunction(() => document.getElementById("verdict").className === "good", null, { timeout: 60000 });
+  await page.done("moves-are-told");
+}
+
+/// Three questions: each opens its leaf with few sliders, says what a step of a slider did, and leads to all numbers of the same leaf.
+async function questions() {
+  const page = await open();
+  const said = () => page.textContent("#said");
+  const ask = async (name) => {
+    await press(page, `[data-question=${name}]`);
+    await page.waitForFunction(() => document.body.classList.contains("lesson") && document.querySelectorAll("#said span").length > 1, null, { timeout: 60000 });
+    await page.rest();
+    assert(!(await page.isVisible("#summary")) && (await page.isVisible("#lesson-measure")), name);
+    assert.equal(await page.evaluate(() => window.leafdyn.sliders.shown.length), { ripple: 3, snap: 2, arch: 3 }[name]);
+  };
+  await ask("ripple");
+  assert.match(await said(), /30 % longer.*ripple, 0.08/);
+  if (keep) await page.screenshot({ path: join(keep, "live-question-ripple.png") });
+  // A point of the plane is pulled to where the leaf is flat, and the leaf follows.
+  const box = await page.locator("#lesson-picture").boundingBox();
+  const at = (x, y) => [box.x + (box.width * x) / 340, box.y + (box.height * y) / 216];
+  await page.mouse.move(...at(60, 90));
+  await page.mouse.down();
+  await page.mouse.move(...at(320, 20), { steps: 4 });
+  await page.mouse.up();
+  await page.rest();
+  await page.waitForFunction(() => /waves vanished|no waves to count/.test(document.getElementById("said").textContent), null, { timeout: 60000 });
+  await ask("snap");
+  const set = (key, value) => page.evaluate(([key, value]) => window.leafdyn.sliders.set(key, value, true), [key, value]);
+  await page.waitForFunction(() => document.querySelector("#lesson-picture circle"), null, { timeout: 60000 });
+  if (keep) await page.screenshot({ path: join(keep, "live-question-snap.png") });
+  await set("load.tip_force[2]", -0.3);
+  await page.waitForFunction(() => /It snapped/.test(document.getElementById("said").textContent), null, { timeout: 60000 });
+  await ask("arch");
+  if (keep) await page.screenshot({ path: join(keep, "live-question-arch.png") });
+  // Greenhill's length of a heavy column of this section: (7.8373 E t^2/(12 rho g))^(1/3).
+  const most = Math.cbrt((7.8373 * 1.2e5 * 0.03 ** 2) / (12 * 1e-5 * 981));
+  assert.match(await said(), new RegExp(`stand up to ${Number(most.toPrecision(2))} cm`));
+  await set("leaf.length", 8);
+  await page.rest();
+  assert.match(await said(), /It stands/);
+  const direct = await open("#q=arch");
+  await direct.waitForFunction(() => document.getElementById("title").textContent === "arch");
+  await direct.done("question-by-address");
+  await press(page, "[data-question='']");
+  assert(await page.isVisible("#summary"));
+  assert.equal(await page.evaluate(() => window.leafdyn.sliders.value("leaf.length")), 8);
+  await page.done("questions");
+}
+
 /// On a telephone, in the dark.
 async function narrow() {
   const page = await open("", { viewport: { width: 400, height: 800 }, colorScheme: "dark" });
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   assert(wide <= 400, `${wide} px wide`);
+  // The picture stays while the sliders scroll.
+  await page.locator("#source").scrollIntoViewIfNeeded();
+  const top = await page.evaluate(() => document.getElementById("stage").getBoundingClientRect().top);
+  assert(top >= 0 && top < 200, `the picture is at ${top}`);
   await page.done("narrow");
 }
 
+const claims = { slides, snaps, moves, hostile, flattensByMouse: () => flattens(false), flattensByKeys: () => flattens(true), sharesOneOfSeveral, gallery, firstSliders, movesAreTold, questions, narrow, named, ...(keep ? { picture } : {}), fast };
+const wanted = process.argv.slice(2);
+
 try {
-  await slides();
-  await snaps();
-  await moves();
-  await hostile();
-  await flattens(false);
-  await flattens(true);
-  await sharesOneOfSeveral();
-  await narrow();
-  await named();
-  if (keep) await picture();
-  await fast();
+  for (const [name, claim] of Object.entries(claims)) if (!wanted.length || wanted.includes(name)) await claim();
   console.log("the live page is as it should be");
 } finally {
   await browser.close();

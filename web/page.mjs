@@ -17,7 +17,7 @@ const scenarios = folders.flatMap((folder) =>
     .map((name) => ({ name: `${folder}/${name}`, text: read("../scenarios", folder, name) })),
 );
 const stage = ["data.js", "space.js", "axes.js", "chart.js", "stage.js"].map((name) => read(pages, name)).join("\n") + read("page/leaf.js");
-const script = ["solver.js", "link.js", "trail.js", "sliders.js", "live.js", "main.js"].map((name) => read("page", name)).join("\n");
+const script = ["solver.js", "link.js", "trail.js", "sliders.js", "live.js", "lessons.js", "main.js"].map((name) => read("page", name)).join("\n");
 // The stage of a leaf of so many veins lasts until another one is opened.
 const scripts = `${read(pages, "three/three.min.js")}\nfunction stageOf(view) {\n"use strict";\n${stage}\n}\n(() => {\n"use strict";\n${script}\n})();`;
 const packed = (bytes) => gzipSync(bytes, { level: 9 }).toString("base64");

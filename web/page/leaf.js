@@ -121,6 +121,7 @@ function show(known) {
   decoded.clear();
   view.modes.forEach((mode) => (mode.decoded = undefined));
   current = leafAt(0);
+  showDirections(current);
   if (shown.mode < 0) plainly(false);
   if (space) grow();
   draw(turned);
@@ -131,6 +132,7 @@ function moving(given) {
   shown.mode = -1;
   plainly(true);
   current = decode(given);
+  showDirections(current);
   if (space) grow();
   draw(false);
 }

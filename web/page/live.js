@@ -33,7 +33,7 @@ function tell(message) {
 const nextFrame = () => new Promise((next) => requestAnimationFrame(next));
 
 /// Opens a scenario; where it is refused, what was open stays.
-async function open({ text, name, values = [], sliders: wanted, last, view, looks = {}, at = null }) {
+async function open({ text, name, values = [], sliders: wanted, last, view, looks = {}, at = null, question = null }) {
   const wish = (now.wish = {});
   now.playing = false;
   while (now.busy) await nextFrame();
@@ -51,6 +51,8 @@ async function open({ text, name, values = [], sliders: wanted, last, view, look
   }
   tell(null);
   Object.assign(now, { text, name, pull: null, pinned: null });
+  // A leaf of one's own is no answer to the question that was open.
+  if (lesson && !question) ask("");
   past.length = 0;
   now.modesAt = null;
   now.before = new Map(values);
@@ -62,7 +64,7 @@ async function open({ text, name, values = [], sliders: wanted, last, view, look
   restage(answer.known.view);
   stage.colourBy(looks.colour);
   if (view && stage.inSpace()) stage.see(view);
-  sliders.open(answer.sliders, wanted, values);
+  sliders.open(answer.sliders, answer.growth, wanted, values);
   trail.choose(answer.known);
   trail.begin(null);
   if (last && sliders.shown.some(({ key }) => key === last)) beginTrail(last, answer.known);
@@ -126,7 +128,10 @@ function tellLeaf(known) {
   find("found").textContent = view.verdict;
   const soft = known.eigenvalues.length > 0 && known.eigenvalues[0] < SOFT * stiffness(known);
   if (stage.shown.mode >= 0) stage.vibrate(true, swing());
-  find("lamp").className = known.stable === false || !view.success ? "bad" : known.stable ? (soft ? "soft" : "good") : "";
+  const state = known.stable === false || !view.success ? "bad" : known.stable ? "good" : "";
+  find("lamp").className = state === "good" && soft ? "soft" : state;
+  find("verdict").className = state;
+  find("summary").classList.remove("past");
   find("what").textContent = view.rods === 1 ? "1 vein" : `${view.rods} veins`;
   const lines = [...view.summary];
   // Where they are not known at once their place is kept: what stands below does not jump.
@@ -136,6 +141,7 @@ function tellLeaf(known) {
   const table = lines.map(([name, text]) => stage.row(name, text));
   if (now.pinned) table.unshift(...differences(now.pinned, known));
   find("summary").tBodies[0].replaceChildren(...table);
+  tellLesson(known);
   // They keep the focus where there is nothing to undo any more.
   find("undo").setAttribute("aria-disabled", past.length === 0);
   find("reset").setAttribute("aria-disabled", !sliders.moved());
@@ -166,7 +172,7 @@ function differences(pinned, known) {
 function changed(done) {
   if (sliders.last !== trail.key) {
     beginTrail(sliders.last, now.known);
-    if (now.known) trail.add(now.before.get(sliders.last) ?? sliders.given(sliders.last), now.known);
+    if (now.known) trail.add(sliders.valueIn(now.before, sliders.last), now.known);
   }
   if (done) remember(sliders.last);
   pump();
@@ -215,7 +221,7 @@ async function follow(modes) {
   tell(null);
   if (answer.answer !== "left") return show(answer, asked);
   trail.gap(asked);
-  find("found").textContent = "its stable equilibria end here: it moves on";
+  tellMotion("its stable equilibria end here: it moves on");
   find("lamp").className = "bad";
   await travel(true, false);
 }
@@ -243,8 +249,9 @@ async function travel(damped, released) {
   let due = 0;
   while (answer.answer === "moving" && !answer.ended && now.playing && !(damped && now.wanted && performance.now() - begun > 300)) {
     stage.moving(answer.leaf);
-    find("now").textContent = damped ? "on its way to the next equilibrium" : `t = ${stage.short(answer.time)}`;
+    find("now").textContent = damped ? "on its way to the next equilibrium" : instantText(answer.time);
     const time = await nextFrame();
+    if (time - (now.toldAt || 0) > TOLD) tellMotion(damped ? "its stable equilibria end here: it moves on" : `in motion, ${instantText(answer.time)}`, answer.tip);
     // Elsewhere a natural period takes about a second.
     const speed = (damped ? 2.5 : 1) / 2 ** (damped ? 0 : Number(find("slower").value));
     due += (Math.min(time - last, 100) / 1000) * speed * (named && !damped ? 1 : answer.unit);
@@ -259,6 +266,22 @@ async function travel(damped, released) {
   if (answer.answer === "lost") return reopen(answer.error);
   if (answer.answer === "refused") tell(answer.error);
   return land({ ask: "land" });
+}
+
+const instantText = (time) => `t = ${stage.short(time)}${now.known.view.units[2] ? ` ${now.known.view.units[2]}` : ""}`;
+
+/// What is known of a leaf in motion: where its tip is. The numbers of the leaf at rest are past, and pale.
+function tellMotion(found, tip) {
+  now.toldAt = performance.now();
+  clearTimeout(now.telling);
+  find("found").textContent = found;
+  find("verdict").className = find("lamp").className = "";
+  const [length] = now.known.view.units;
+  const here = tip ? [stage.row("tip now", `(${tip.map(stage.short).join(", ")})${length ? ` ${length}` : ""}`)] : [];
+  here.forEach((row) => row.classList.add("now"));
+  const rest = now.known.view.summary.map(([name, text]) => stage.row(name, text));
+  find("summary").classList.add("past");
+  find("summary").tBodies[0].replaceChildren(...here, ...rest);
 }
 
 async function land(question) {
@@ -323,7 +346,7 @@ async function wonder() {
     if (bare.answer === "unloaded" && same()) stage.beside("unloaded", bare.view.leaves[0], "--frame");
   }
   const slider = sliders.shown.find(({ key }) => key === trail.key);
-  if (slider && pressed("foresee") && !slider.whole && same() && !isOn(trail.branch, slider, now.known)) {
+  if (slider && pressed("foresee") && !slider.whole && slider.key !== MARGINS && same() && !isOn(trail.branch, slider, now.known)) {
     const { key, low, high, log } = slider;
     sliders.foresee(key, null);
     trail.foresee(null);
@@ -336,6 +359,7 @@ async function wonder() {
       Object.assign(branch, { low, high, log, others: asked });
       sliders.foresee(key, branch);
       trail.foresee(branch);
+      tellLesson(now.known);
     }
   }
 }
@@ -377,7 +401,7 @@ async function others() {
 }
 
 async function rank() {
-  const keys = sliders.shown.filter(({ whole }) => !whole).map(({ key }) => key);
+  const keys = sliders.shown.filter(({ key, whole }) => !whole && key !== MARGINS).map(({ key }) => key);
   const found = await front.ask({ ask: "sensitivity", keys });
   if (found.answer !== "sensitivity") return tell(found.error);
   const size = ({ key, tips }) => [key, Math.hypot(...tips[0]) * Math.abs(sliders.value(key) || sliders.shown.find((one) => one.key === key).high)];

@@ -76,6 +76,7 @@ function listen() {
   for (const event of ["pointerdown", "input"]) document.addEventListener(event, () => pressed("pull") || advise(""), { once: true });
   find("theme").addEventListener("click", () => {
     stage.setTheme(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
+    stage.again();
     trail.later();
   });
   find("undo").addEventListener("click", undo);
@@ -120,6 +121,7 @@ function listen() {
   find("slower").addEventListener("input", tellSlower);
   tellSlower();
   document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => stage.look(button.dataset.view)));
+  document.querySelectorAll("[data-question]").forEach((button) => button.addEventListener("click", () => ask(button.dataset.question)));
   find("gallery").addEventListener("change", () => open(gallery[Number(find("gallery").value)]));
   find("read").addEventListener("click", read);
   find("file").addEventListener("change", () => readFile(find("file").files[0]));
@@ -141,6 +143,7 @@ function listen() {
   window.addEventListener("hashchange", async () => {
     const shared = await unpacked(location.hash).catch(() => null);
     if (shared) open(shared);
+    else if (questionOf(location.hash)) ask(questionOf(location.hash));
   });
   new ResizeObserver(() => {
     stage.resize();
@@ -202,11 +205,13 @@ async function begin() {
   const given = JSON.parse(find("given").textContent);
   const shared = await unpacked(location.hash).catch(() => null);
   const opened = (shared && (await open(shared))) || (given && (await open(given)));
-  if (!opened) await open(gallery.find(({ name }) => name.includes("fig04")) || gallery[0]);
+  const question = questionOf(location.hash);
+  if (question) await ask(question);
+  else if (!opened) await open(gallery.find(({ name }) => name.includes("fig04")) || gallery[0]);
   listen();
   requestAnimationFrame(tick);
   /// For tests, and for whoever builds on the page.
-  window.leafdyn = { now, gallery, sliders, trail, open, share, play, stage: () => stage, front, back };
+  window.leafdyn = { now, gallery, sliders, trail, open, ask, share, play, stage: () => stage, front, back };
 }
 
 begin().catch((reason) => {

@@ -17,33 +17,74 @@ const valueOf = ({ low, high, log, whole }, part) => {
 };
 const rounded = (value) => Number(value.toPrecision(6));
 
+/// The slider of all veins that have grown, which is none of a number of the scenario: by how much the margins are longer than the midrib.
+const MARGINS = "margins";
+
+/// What else numbers are looked for by.
+const MEANT = [
+  [/^margins$/, "ripple ripples wave waves edge edges growth grown"],
+  [/rest\.stretch/, "ripple wave margin edge growth grown"],
+  [/load\.g(ravity)?\b/, "weight heavy light mass gravity"],
+  [/bending|young/, "stiff soft floppy modulus"],
+  [/torsion|shear_modulus/, "twist stiff soft"],
+  [/thickness/, "thick thin"],
+  [/wind/, "blow gust storm air"],
+];
+
 /// All numbers of the scenario, those that are shown, and the values that were changed.
 class Sliders {
   constructor(rows, change) {
-    Object.assign(this, { rows, change, all: [], shown: [], values: new Map(), marks: new Map() });
+    Object.assign(this, { rows, change, all: [], shown: [], values: new Map(), marks: new Map(), growth: null });
   }
 
-  /// Takes the numbers of a scenario; shown are those asked for, or some that matter.
-  open(all, wanted, values) {
-    this.all = all;
+  /// Takes the numbers of a scenario, and the growth of its margins; shown are those asked for, or those that move the leaf most.
+  open(all, growth, wanted, values) {
+    this.growth = growth;
+    this.all = growth ? [marginsSlider(this.growthOf(() => NaN)), ...all] : all;
     this.values = new Map(values);
     this.marks.clear();
-    const known = new Map(all.map((one) => [one.key, one]));
+    const known = new Map(this.all.map((one) => [one.key, one]));
     const asked = (wanted || []).filter(({ key }) => known.has(key)).map((one) => ({ ...known.get(one.key), ...one }));
+    const lost = (wanted || []).filter(({ key }) => !known.has(key)).map(({ key }) => key);
     const ends = ({ low, high }) => ({ low: rounded(low), high: rounded(high) });
-    this.shown = asked.length ? asked : first(all).map((one) => ({ ...one, ...ends(one) }));
-    find("keys").replaceChildren(...all.map(({ key, description }) => new Option(description, key)));
+    this.shown = asked.length ? asked : first(this.all).map((one) => ({ ...one, ...ends(one) }));
+    find("added").textContent = lost.length ? `this scenario has no number ${lost.join(", ")}` : "";
+    find("keys").replaceChildren(...this.all.map(({ key, words }) => new Option(words, key)));
     this.fill();
+  }
+
+  /// By how many per cent the first vein is longer than that in the middle, with the stretches that a function knows, or else those given.
+  growthOf(known) {
+    const { keys, stretches } = this.growth;
+    const [first, middle] = [0, stretches.length >> 1].map((j) => (Number.isFinite(known(keys[j])) ? known(keys[j]) : stretches[j]));
+    return 100 * (first / middle - 1);
+  }
+
+  /// The values of numbers of the scenario that a value of a slider means.
+  meant(key, value) {
+    if (key !== MARGINS) return [[key, value]];
+    const { keys, stretches } = this.growth;
+    const middle = stretches[stretches.length >> 1];
+    const part = value / this.given(MARGINS);
+    return keys.map((key, j) => [key, Number((middle + part * (stretches[j] - middle)).toPrecision(12))]);
   }
 
   /// What the scenario has.
   given(key) {
     const given = this.all.find((one) => one.key === key);
-    return given ? given.value : NaN;
+    if (given) return given.value;
+    const vein = this.growth ? this.growth.keys.indexOf(key) : -1;
+    return vein < 0 ? NaN : this.growth.stretches[vein];
   }
 
   value(key) {
-    return this.values.has(key) ? this.values.get(key) : this.given(key);
+    return this.valueIn(this.values, key);
+  }
+
+  /// The value of a slider where these numbers of the scenario have changed.
+  valueIn(values, key) {
+    if (key === MARGINS && this.growth) return this.growthOf((key) => values.get(key));
+    return values.has(key) ? values.get(key) : this.given(key);
   }
 
   /// Whether any number is another than that of the scenario.
@@ -63,14 +104,17 @@ class Sliders {
       if (value > slider.high) slider.high = value;
       if (value < slider.low && !(slider.log && value <= 0)) slider.low = value;
     }
-    this.values.set(key, value);
+    for (const [number, its] of this.meant(key, value)) this.values.set(number, its);
     this.place(key);
     this.change(done);
   }
 
+  /// Adds the slider of a number by its key or by a part of what it is called; of several that which moves the leaf most.
   add(text) {
     const wanted = text.trim().toLowerCase();
-    const found = this.all.find(({ key }) => key === text.trim()) || this.all.find(({ key, description }) => wanted && `${key} ${description}`.toLowerCase().includes(wanted));
+    const called = ({ key, words, description }) => [key, words, description, ...MEANT.filter(([which]) => which.test(key)).map(([, words]) => words)].join(" ").toLowerCase();
+    const alike = this.all.filter((one) => wanted && called(one).includes(wanted)).sort((a, b) => (b.effect || 0) - (a.effect || 0));
+    const found = this.all.find(({ key }) => key === text.trim()) || alike[0];
     if (!found) return false;
     if (!this.shown.some(({ key }) => key === found.key)) this.shown.unshift({ ...found, low: rounded(found.low), high: rounded(found.high) });
     this.fill();
@@ -83,7 +127,7 @@ class Sliders {
     this.shown.splice(at, 1);
     this.fill();
     const next = this.shown[Math.min(at, this.shown.length - 1)];
-    (next ? next.parts.away : find("add")).focus();
+    (next ? next.parts.range : find("add")).focus();
   }
 
   fill() {
@@ -92,17 +136,19 @@ class Sliders {
   }
 
   row(slider) {
-    const { key, description } = slider;
+    const { key, description, words, unit } = slider;
     const make = (tag, properties, ...children) => {
       const element = Object.assign(document.createElement(tag), properties);
       element.append(...children);
       return element;
     };
     const id = `slider ${key}`.replaceAll(/\W/g, "-");
-    const number = make("input", { type: "number", step: "any" });
+    // The Tab key stops once: from there Enter leads to the number, and Escape back.
+    const number = make("input", { type: "number", step: "any", tabIndex: -1 });
     number.setAttribute("aria-label", `${key}, as a number`);
     number.addEventListener("change", () => (Number.isFinite(number.valueAsNumber) ? this.set(key, number.valueAsNumber, true) : this.place(key)));
     number.addEventListener("keydown", (event) => {
+      if (event.key === "Escape") range.focus();
       const way = { ArrowUp: 1, ArrowDown: -1 }[event.key];
       if (!way || event.altKey || event.ctrlKey) return;
       event.preventDefault();
@@ -112,16 +158,22 @@ class Sliders {
     const range = make("input", { type: "range", min: 0, max: STEPS, step: slider.whole ? "any" : 1, id, title: description });
     range.addEventListener("input", () => this.set(key, valueOf(slider, range.value / STEPS), false));
     range.addEventListener("change", () => this.change(true));
-    const away = make("button", { type: "button", textContent: "×", title: `takes the slider of ${key} away` });
+    range.addEventListener("keydown", (event) => {
+      if (event.key === "Delete") this.remove(key);
+      if (event.key !== "Enter") return;
+      event.preventDefault();
+      number.select();
+    });
+    const away = make("button", { type: "button", tabIndex: -1, textContent: "×", title: `takes the slider of ${key} away` });
     away.setAttribute("aria-label", `take the slider of ${key} away`);
     away.addEventListener("click", () => this.remove(key));
     const end = (name) => {
-      const input = make("input", { type: "number", step: "any", value: slider[name] });
+      const input = make("input", { type: "number", step: "any", tabIndex: -1, value: slider[name] });
       input.setAttribute("aria-label", `${name === "low" ? "lowest" : "highest"} ${key}`);
       input.addEventListener("change", () => this.range(slider, name, input));
       return input;
     };
-    const log = make("input", { type: "checkbox", checked: slider.log });
+    const log = make("input", { type: "checkbox", tabIndex: -1, checked: slider.log });
     log.setAttribute("aria-label", `logarithmic ${key}`);
     log.addEventListener("change", () => {
       slider.log = log.checked && slider.low > 0;
@@ -138,7 +190,7 @@ class Sliders {
     const row = make(
       "div",
       { className: "slider" },
-      make("div", { className: "head" }, make("label", { htmlFor: id, textContent: key, title: description }), number, away),
+      make("div", { className: "head" }, make("label", { htmlFor: id, title: description }, make("span", { className: "words", textContent: withItsUnit(words, unit) }), make("span", { className: "key", textContent: key })), number, away),
       make("div", { className: "way" }, range, marks),
       make("div", { className: "ends" }, ends.low, make("label", {}, log, " log"), ends.high),
     );
@@ -215,9 +267,25 @@ class Sliders {
   }
 }
 
-/// Numbers that one wants to move first.
+const withItsUnit = (words, unit) => (unit ? `${words} / ${unit}` : words);
+
+/// The slider of the growth of the margins, in per cent.
+function marginsSlider(value) {
+  return { key: MARGINS, words: "margins longer than the midrib by", unit: "%", value, low: 0, high: 2 * value, log: false, whole: false, effect: Infinity, description: "growth of the veins: the outermost by this part, those between as they are in the scenario" };
+}
+
+/// Lists have a number for each vein, and a factor of all, which tells more.
+const OF_ONE_VEIN = /^(leaf|stiffness|section|blade|rest|coupling|tissue|dynamics|foundation)\..*\[/;
+/// Effects that differ by a smaller part are those of one number by two names.
+const ONE_EFFECT = 1e-6;
+
+/// Numbers that one wants to move first: those that move the leaf most, each once.
 function first(all) {
-  const wanted = ["load.g[2]", "load.gravity[2]", "load.tip_force[2]", "load.tip_force[0]", "rest.bend_2", "scale:rest.bend_2", "scale:rest.bend_3", "stiffness.torsion", "scale:stiffness.torsion", "stiffness.bending_2", "scale:stiffness.bending_2", "section.young", "blade.thickness", "blade.young", "tip.position[0]", "grip[1].move[1]", "coupling.z", "leaf.length", "blade.length"];
-  const found = wanted.map((key) => all.find((one) => one.key === key)).filter((one) => one && Number.isFinite(one.value) && one.value !== 0);
-  return (found.length ? found : all.filter(({ value }) => Number.isFinite(value))).slice(0, 4);
+  const finite = all.filter(({ value }) => Number.isFinite(value));
+  const able = finite.filter(({ key, value, effect, whole }) => effect > 0 && value !== 0 && !whole && !OF_ONE_VEIN.test(key));
+  // Of two names that without a factor.
+  const ranked = able.sort((a, b) => b.effect - a.effect || a.key.startsWith("scale:") - b.key.startsWith("scale:"));
+  const once = [];
+  for (const one of ranked) if (!once.some(({ effect }) => effect === one.effect || Math.abs(effect - one.effect) < ONE_EFFECT * effect)) once.push(one);
+  return (once.length ? once : finite).slice(0, 4);
 }

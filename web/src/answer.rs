@@ -3,9 +3,9 @@
 use crate::motion::Instant;
 use base64::prelude::{BASE64_STANDARD, Engine};
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::Scenario;
+use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::{PointKind, ScenarioNumber, Trace, TraceBranch};
-use leafdyn_program::page::{self, PageData};
+use leafdyn_program::page::{self, PageData, QuantityLabel};
 use serde::Serialize;
 
 /// An answer.
@@ -19,6 +19,8 @@ pub enum Answer {
     Opened {
         known: Known,
         sliders: Vec<Slider>,
+        #[serde(skip_serializing_if = "Option::is_none")]
+        growth: Option<Growth>,
     },
     /// The leaf in the equilibrium into which the one before has changed.
     Followed(Known),
@@ -121,14 +123,59 @@ pub struct Slider {
     log: bool,
     whole: bool,
     description: &'static str,
+    /// What it is, for who does not know the keys, and its unit.
+    words: String,
+    unit: Option<String>,
+    /// How far any point of the leaf moves, in lengths, by a change of the number by its own size: to
+    /// first order.
+    effect: Option<f64>,
+}
+
+/// Veins that have grown by different parts, the outermost most: each number of its list, from one margin
+/// to the other.
+#[derive(Serialize)]
+pub struct Growth {
+    pub keys: Vec<String>,
+    pub stretches: Vec<f64>,
+}
+
+/// What figures call a number by its symbol, and what it does to a leaf.
+const PLAIN_WORDS: [(&str, &str); 9] = [
+    ("bending stiffness A2", "bending stiffness, up and down"),
+    ("bending stiffness A3", "bending stiffness, sideways"),
+    ("torsional stiffness A1", "stiffness against twisting"),
+    ("axial stiffness H1", "stiffness against stretching"),
+    ("shear stiffness H2", "stiffness against shear, sideways"),
+    ("shear stiffness H3", "stiffness against shear, up and down"),
+    (
+        "curvature at rest about d2",
+        "natural curvature, up and down",
+    ),
+    ("curvature at rest about d3", "natural curvature, sideways"),
+    ("twist at rest", "natural twist"),
+];
+
+/// The number of a key in words.
+fn plain_words(key: &str, label: String) -> String {
+    let words = PLAIN_WORDS.iter();
+    let mut words = words.fold(label, |words, (symbol, plain)| words.replace(symbol, plain));
+    if key.trim_start_matches("scale:").starts_with("load.gravity") {
+        words = words.replacen("gravity", "weight of the veins", 1);
+    }
+    match words.strip_prefix("factor of ") {
+        Some(words) => format!("{words}, times"),
+        None => words,
+    }
 }
 
 /// How far a range goes from the value, as a factor or as a part of its size.
 const RANGE: f64 = 4.0;
 
 impl Slider {
-    /// Of a number of a scenario.
-    pub fn new(number: ScenarioNumber) -> Slider {
+    /// Of a number of a scenario with these units, and its effect.
+    pub fn new(number: ScenarioNumber, units: &Units, effect: Option<f64>) -> Slider {
+        let key = number.keys.to_string();
+        let QuantityLabel { words, unit } = QuantityLabel::from_keys(&key, units);
         let ScenarioNumber { value, .. } = number;
         let log = number.positive && !number.whole && value > 0.0;
         let size = if value == 0.0 {
@@ -143,7 +190,10 @@ impl Slider {
             _ => (value - 2.0 * size, value + 2.0 * size),
         };
         Slider {
-            key: number.keys.to_string(),
+            words: plain_words(&key, words),
+            unit,
+            effect,
+            key,
             value,
             low,
             high,

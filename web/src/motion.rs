@@ -20,7 +20,7 @@ const TOLERANCE: f64 = 1e-3;
 pub struct Motion {
     simulation: Simulation,
     page: page::PageData,
-    joined: bool,
+    scenario: Scenario,
     damped: bool,
     unit: f64,
     fastest: f64,
@@ -66,7 +66,7 @@ impl Motion {
         Ok(Motion {
             simulation,
             page: page::page_data_without_result(&scenario),
-            joined: scenario.joined,
+            scenario,
             damped,
             unit,
             fastest: 0.0,
@@ -109,9 +109,15 @@ impl Motion {
 
     fn instant(&self, frame: &Frame) -> Instant {
         let curves = frame.curves();
-        let tip = frame.tips(self.joined)[0];
+        let tip = frame.tips(self.scenario.joined)[0];
         Instant {
-            leaf: page::moving_leaf(self.simulation.stations(), &curves, &self.page),
+            leaf: page::moving_leaf(
+                self.simulation.stations(),
+                &curves,
+                &self.page,
+                &self.scenario,
+                frame.time,
+            ),
             time: frame.time,
             tip: tip.to_array(),
             step: self.unit / OUTPUTS,

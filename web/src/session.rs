@@ -1,6 +1,6 @@
 //! A leaf on the page: opened, changed, let go, asked for what comes.
 
-use crate::answer::{Answer, Known, Slider, Told, branch};
+use crate::answer::{Answer, Growth, Known, Slider, Told, branch};
 use crate::motion::Motion;
 use crate::place;
 use crate::question::{Pull, Question, Values};
@@ -9,10 +9,11 @@ use leafdyn::relax::{
 };
 use leafdyn::scenario::Scenario;
 use leafdyn::study::{
-    BaseScenario, ParameterKeys, ParameterSweep, SensitivityError, TraceRequest, VaryError,
-    equilibria, sensitivities_of_tracker, trace_through,
+    BaseScenario, ParameterKeys, ParameterSweep, ScenarioNumber, SensitivityError, TraceRequest,
+    VaryError, equilibria, sensitivities_of_tracker, trace_through,
 };
 use leafdyn_program::files::{self, ResultDocument};
+use std::collections::HashMap;
 use std::time::Duration;
 
 /// What a leaf on a screen needs.
@@ -24,6 +25,9 @@ const PATIENCE: u64 = 8;
 /// Points of a branch that are drawn, and seconds for all that is asked in the background.
 const MOST_POINTS: usize = 400;
 const SECONDS: u64 = 20;
+
+/// Derivatives by more numbers at once are those of the tip alone.
+const KEYS_AT_ONCE: usize = 100;
 
 /// Why there is no answer.
 #[derive(Debug, thiserror::Error)]
@@ -89,10 +93,14 @@ impl Session {
                 at,
             } => {
                 let open = Open::new(BaseScenario::from_text(text, name, &[])?, values, at)?;
-                let sliders = open.sliders();
+                let (sliders, growth) = (open.sliders(), open.growth());
                 let known = open.known();
                 (self.open, self.motion) = (Some(open), None);
-                return Ok(Answer::Opened { known, sliders });
+                return Ok(Answer::Opened {
+                    known,
+                    sliders,
+                    growth,
+                });
             }
             Question::Go { damped, released } => {
                 let open = self.opened()?;
@@ -210,7 +218,47 @@ impl Open {
     }
 
     fn sliders(&self) -> Vec<Slider> {
-        self.base.numbers().into_iter().map(Slider::new).collect()
+        let numbers = self.base.numbers();
+        let effects = self.effects(&numbers);
+        let slider = |number: ScenarioNumber| {
+            let effect = effects.get(&number.keys.to_string()).copied();
+            Slider::new(number, &self.scenario.units, effect)
+        };
+        numbers.into_iter().map(slider).collect()
+    }
+
+    /// How far any point of the leaf moves, in lengths, by a change of each number by its own size: of
+    /// those that can be differentiated.
+    fn effects(&self, numbers: &[ScenarioNumber]) -> HashMap<String, f64> {
+        let (Some(follower), Ok(base)) = (&self.follower, self.fixed(None)) else {
+            return HashMap::new();
+        };
+        let sized = numbers.iter().filter(|number| number.value != 0.0);
+        let keys: Vec<ParameterKeys> = sized
+            .map(|number| number.keys.clone())
+            .filter(|keys| base.differentiable_value(keys).is_ok())
+            .collect();
+        let longest = leafdyn::scenario::longest(&self.scenario.rods);
+        let mut effects = HashMap::new();
+        for keys in keys.chunks(KEYS_AT_ONCE) {
+            let found = sensitivities_of_tracker(follower, &base, keys).unwrap_or_default();
+            effects.extend(found.into_iter().map(|it| {
+                let moved = it.positions.iter().flatten().chain(&it.tips);
+                let largest = moved.map(|by| by.length()).fold(0.0, f64::max);
+                (it.key, largest * it.value.abs() / longest)
+            }));
+        }
+        effects
+    }
+
+    /// The growth of the veins, if the margins have grown more than the midrib.
+    fn growth(&self) -> Option<Growth> {
+        let keys = (0..self.scenario.rods.len()).map(|vein| format!("rest.stretch[{vein}]"));
+        let keys: Vec<String> = keys.collect();
+        let number = |key: &String| self.base.number(&key.parse().ok()?);
+        let stretches = keys.iter().map(number).collect::<Option<Vec<f64>>>()?;
+        let middle = stretches.get(stretches.len() / 2)?;
+        (stretches.first()? > middle).then_some(Growth { keys, stretches })
     }
 
     /// The leaf with other values: followed there if it can, or found anew.

@@ -216,3 +216,47 @@ fn all_scenarios_open_with_their_sliders() {
     }
     assert!(count > 30);
 }
+
+/// A slider says what its number is in words, and how far the leaf goes with it: as a small change of the
+/// number moves it.
+#[test]
+fn sliders_know_their_words_and_what_they_do() {
+    let mut session = Session::default();
+    let opened = open(&mut session, "paper/fig04.toml");
+    let sliders = opened["sliders"].as_array().unwrap();
+    let slider = |key: &str| sliders.iter().find(|it| it["key"] == key).unwrap();
+    for (key, words) in [
+        ("stiffness.bending_2", "bending stiffness, up and down"),
+        ("stiffness.torsion", "stiffness against twisting"),
+        ("load.gravity[2]", "weight of the veins along z"),
+    ] {
+        assert_eq!(slider(key)["words"], words);
+    }
+    let effect = |key: &str| slider(key)["effect"].as_f64().unwrap();
+    assert!(effect("stiffness.torsion") < 1e-3 * effect("load.gravity[2]"));
+    // The tip moves farthest: against a central difference.
+    let [more, less] = [-1.01, -0.99].map(|value| {
+        let question = json!({ "ask": "set", "values": [["load.gravity[2]", value]] });
+        let known = ask(&mut session, question);
+        let tip = known["tips"][0].as_array().unwrap().clone();
+        [0, 1, 2].map(|axis: usize| tip[axis].as_f64().unwrap())
+    });
+    let moved = [0, 1, 2].map(|axis| (more[axis] - less[axis]) / 0.02);
+    let moved = moved.iter().map(|it| it * it).sum::<f64>().sqrt();
+    let told = effect("load.gravity[2]");
+    assert!((told - moved).abs() < 2e-3 * moved, "{told} {moved}");
+    assert!(opened["growth"].is_null());
+}
+
+/// The growth of margins is told vein by vein where they have grown.
+#[test]
+fn grown_margins_are_told() {
+    let opened = open(&mut Session::default(), "study/undulation.toml");
+    let growth = &opened["growth"];
+    assert_eq!(growth["keys"].as_array().unwrap().len(), 11);
+    assert_eq!(growth["keys"][10], "rest.stretch[10]");
+    assert_eq!(
+        (&growth["stretches"][0], &growth["stretches"][5]),
+        (&json!(1.3), &json!(1.0))
+    );
+}

@@ -4,13 +4,13 @@
 //! Labels stand on both sides of a curve where there is room; curves close to each other share them. Ground
 //! is stable where all curves around it say so, which is found along rows and columns of the panel.
 
-use crate::figure::drawing::axes::{Axis, PanelAxes, round_step};
+use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::labels::{
     LabelPlacement, Legend, MOST_CURVES_NAMED, clearest_label, label_size, new_page,
 };
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::space::SmallPanels;
-use crate::figure::drawing::veins::{DrawnVeins, longest_curve, vein_tips};
+use crate::figure::drawing::veins::{DrawnVeins, longest_curve, magnify_displacements, vein_tips};
 use crate::figure::drawing::{
     BLUE, Color, DashPattern, Drawing, FONT_SIZE, GREEN, NOTE_COLOR, PAGE, PURPLE, PageRectangle,
     SKY, SLATE, Stroke, TEXT_COLOR, TextAnchor, VERMILION, draw_panel_title, polygon_path,
@@ -43,9 +43,6 @@ const LAYOUT: BoundaryLayout = BoundaryLayout {
     most_leaves: 4,
 };
 
-/// Displacements of a buckled leaf below this fraction of its length are magnified.
-const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
-
 /// Colors of neighboring curves; they also differ in their dashes.
 const BOUNDARY_COLORS: [Color; 6] = [BLUE, VERMILION, GREEN, PURPLE, SLATE, SKY];
 
@@ -64,7 +61,11 @@ pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
     let below = diagram.opposite_corner().y + PAGE.panel_axis;
     let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, below);
     let name = format!("{}: where the index changes", boundary.scenario);
-    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(boundary), None);
+    let mut notes = header_notes(boundary);
+    if shown.iter().any(|leaf| leaf.caption.contains('×')) {
+        notes.push("×: how much larger its buckling is drawn".into());
+    }
+    let mut drawing = new_page(PAGE.left_margin, &name, &notes, None);
     drawing.height = panels.bottom();
     drawing.draw_group("curves", |page| {
         draw_curves(page, boundary, &scenario.units, &shown, diagram)
@@ -72,7 +73,7 @@ pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
     drawing.draw_group("leaves", |page| {
         for (number, (veins, shown)) in shapes.iter().zip(&shown).enumerate() {
             let [first, second] = shown.leaf.values.map(format_four_digits);
-            let text = format!("{}, ({first}, {second})", shown.caption);
+            let text = format!("({first}, {second}): {}", shown.caption);
             panels.draw_leaf(page, number, veins, [&leaf_letter(number), &text]);
         }
     });
@@ -108,15 +109,8 @@ impl<'b> CaptionedLeaf<'b> {
     /// magnified until they are visible.
     fn with_magnified_displacements(leaf: &'b LeafBeside, from: &[Vec<DVec3>]) -> Self {
         let mut curves = leaf.curves.clone();
-        let largest = curves.iter().flatten().zip(from.iter().flatten());
-        let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
-        let visible = LEAST_VISIBLE_DISPLACEMENT * longest_curve(&curves);
         let mut caption = "buckled".to_string();
-        if 0.0 < largest && largest < visible {
-            let factor = round_step(visible / largest);
-            for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
-                *x = *from + factor * (*x - *from);
-            }
+        if let Some(factor) = magnify_displacements(&mut curves, from) {
             caption += &format!(" ×{}", format_four_digits(factor));
         }
         let tips = vein_tips(&curves, leaf.tips.len() == 1);
@@ -310,12 +304,12 @@ fn draw_legend(
         (boundary.curves.iter().zip(lines).enumerate()).take(MOST_CURVES_NAMED)
     {
         let what = index_change_text(curve).unwrap_or_else(|| "not verified".into());
-        key.add_line(
-            page,
-            &format!("curve {}", c + 1),
-            &what,
-            curve_stroke(c, line),
-        );
+        let beside = (0..c).find(|&other| line.coincides_with(&lines[other]));
+        let name = match beside {
+            Some(other) => format!("curve {}, beside curve {}", c + 1, other + 1),
+            None => format!("curve {}", c + 1),
+        };
+        key.add_line(page, &name, &what, curve_stroke(c, line));
     }
     if more > 0 {
         key.add_entry(page, "", &format!("and {more} more"), |_, _| ());
@@ -411,6 +405,17 @@ struct LabelPlace {
     sides: [usize; 2],
 }
 
+/// Curves closer than this, in pixels, along this part of one are drawn over each other.
+const COINCIDING_CURVES: f64 = 4.0;
+const COINCIDING_PART: f64 = 0.8;
+
+/// The distance of a point from a straight piece.
+fn distance_to_segment(point: DVec2, [from, to]: [DVec2; 2]) -> f64 {
+    let way = to - from;
+    let along = (point - from).dot(way) / way.length_squared().max(f64::MIN_POSITIVE);
+    point.distance(from + along.clamp(0.0, 1.0) * way)
+}
+
 /// A straight piece of a curve.
 struct BoundarySegment {
     pub ends: [DVec2; 2],
@@ -487,6 +492,17 @@ impl BoundaryLine {
 
     fn segment_ends(&self) -> impl Iterator<Item = [DVec2; 2]> {
         self.segments.iter().map(|segment| segment.ends)
+    }
+
+    /// Whether the page does not show it apart from another one: along nearly all of its length.
+    fn coincides_with(&self, other: &BoundaryLine) -> bool {
+        let is_near = |segment: &BoundarySegment| {
+            let middle = 0.5 * (segment.ends[0] + segment.ends[1]);
+            let mut others = other.segments.iter();
+            others.any(|it| distance_to_segment(middle, it.ends) < COINCIDING_CURVES)
+        };
+        let near = self.segments.iter().filter(|segment| is_near(segment));
+        near.count() as f64 > COINCIDING_PART * self.segments.len() as f64
     }
 
     /// Whether ground on one of its sides is stable.

@@ -7,9 +7,9 @@
 
 use crate::figure::drawing::labels::new_page;
 use crate::figure::drawing::space::{
-    BoxMargins, FRONT_VIEW, LEAF_PADDING, OBLIQUE_VIEW, PlaneView, SMALL_LINE_WIDTH_FACTOR,
-    SmallPanels, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT, VIEW_FROM_SIDE, ViewAngles,
-    draw_plane_panel, padded_box,
+    BoxMargins, FRONT_VIEW, LEAF_PADDING, PlaneView, SMALL_LINE_WIDTH_FACTOR, SmallPanels,
+    SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT, VIEW_FROM_SIDE, ViewAngles, draw_plane_panel,
+    padded_box,
 };
 use crate::figure::drawing::veins::{DrawnVein, DrawnVeins, draw_leaf_markers, vein_tips};
 use crate::figure::drawing::{
@@ -18,12 +18,14 @@ use crate::figure::drawing::{
 };
 use crate::figure::rod;
 use crate::figure::scenario::FigureSetting;
-use crate::report::numbers::{format_error_bound, format_four_digits};
+use crate::report::numbers::{format_error_bound, format_four_digits, number_in_unit};
 use crate::report::{relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Mode};
-use leafdyn::scenario::Scenario;
+use leafdyn::scenario::units::RATE;
+use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::Equilibria;
+use std::f64::consts::TAU;
 
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
@@ -79,7 +81,9 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
         .iter()
         .map(|found| DrawnVeins::from_equilibrium(&found.equilibrium, scenario));
     let shapes: Vec<DrawnVeins> = shapes.collect();
-    let panels = SmallPanels::fitted_to_shapes(shapes.iter(), shown.len(), &setting, PAGE.header);
+    let view = ViewAngles::telling_apart(&shapes);
+    let count = shown.len();
+    let panels = SmallPanels::seen_from(view, shapes.iter(), count, &setting, PAGE.header);
     let name = format!("{}: equilibria, lowest energy first", all.scenario);
     let count = all.found.len();
     let mut notes = vec![format!("{count} found from {} starts", all.starts)];
@@ -270,7 +274,8 @@ impl LeafPanels {
         );
         drawing.draw_group("space", |page| {
             let bounds = padded_box(veins.low, veins.high);
-            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, SPACE_MARGINS, None);
+            let view = ViewAngles::oblique([veins.tip_from_base()]);
+            let scene = SpacePanel::new(bounds, setting, view, cell, SPACE_MARGINS, None);
             draw_panel_title(page, cell.corner, "(d)", "in space");
             scene.draw_floor_and_walls(page);
             scene.draw_axes(page, 38.0);
@@ -281,9 +286,6 @@ impl LeafPanels {
 }
 
 const MOST_MODES_DRAWN: usize = 12;
-
-/// A motion towards the viewer in one view is visible in the other.
-const MODE_VIEWS: [ViewAngles; 2] = [OBLIQUE_VIEW, FRONT_VIEW];
 
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const LARGEST_DRAWN_AMPLITUDE: f64 = 0.2;
@@ -298,10 +300,11 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
         .iter()
         .map(|mode| displaced_veins(equilibrium, &rest, mode));
     let shapes: Vec<DrawnVeins> = shapes.collect();
-    // Every mode in two views.
-    let count = MODE_VIEWS.len() * drawn.len();
-    let panels =
-        SmallPanels::fitted_to_shapes(shapes.iter().chain([&rest]), count, &setting, PAGE.header);
+    // Every mode in two views: a motion towards the viewer in one is visible in the other.
+    let views = [ViewAngles::oblique([rest.tip_from_base()]), FRONT_VIEW];
+    let count = views.len() * drawn.len();
+    let all = shapes.iter().chain([&rest]);
+    let panels = SmallPanels::seen_from(views[0], all, count, &setting, PAGE.header);
     let mut notes = vec![
         format!("N = {}", rest.count),
         relaxation_verdict(equilibrium),
@@ -316,7 +319,7 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing.height = panels.bottom();
     for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {
-            let (number, text) = ((index + 1).to_string(), mode_text(mode));
+            let (number, text) = ((index + 1).to_string(), mode_text(mode, &scenario.units));
             let captions = [
                 PanelCaption {
                     letter: &number,
@@ -329,8 +332,8 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
                     color: NOTE_COLOR,
                 },
             ];
-            for (k, (view, caption)) in MODE_VIEWS.into_iter().zip(captions).enumerate() {
-                let place = MODE_VIEWS.len() * index + k;
+            for (k, (view, caption)) in views.into_iter().zip(captions).enumerate() {
+                let place = views.len() * index + k;
                 let scene = panels.draw_empty_panel(page, place, 0.0, view, caption);
                 let width = SMALL_LINE_WIDTH_FACTOR * veins.line_width();
                 for vein in &rest.veins {
@@ -344,15 +347,18 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     drawing
 }
 
-/// The frequency of a mode or, if it is unstable, its growth rate.
-fn mode_text(mode: &Mode) -> String {
-    match (mode.is_neutral(), mode.growth()) {
-        (true, _) => "neutral: ω = 0".into(),
-        (_, None) => {
-            let frequency = format_four_digits(mode.frequency().unwrap_or_default());
-            format!("ω = {frequency}")
-        }
-        (_, Some(growth)) => format!("unstable: grows at {}", format_four_digits(growth)),
+/// The frequency of a mode or, if it is unstable, its growth rate: cycles per time where the scenario names
+/// its unit of time, and otherwise the angular frequency.
+pub fn mode_text(mode: &Mode, units: &Units) -> String {
+    let angular = mode.frequency().unwrap_or_default();
+    match (mode.is_neutral(), mode.growth(), units.frequency()) {
+        (true, ..) => "neutral: ω = 0".into(),
+        (_, None, None) => format!("ω = {}", format_four_digits(angular)),
+        (_, None, Some(unit)) => format!("{} {unit}", format_four_digits(angular / TAU)),
+        (_, Some(growth), _) => format!(
+            "unstable: grows at {}",
+            number_in_unit(format_four_digits(growth), units, RATE)
+        ),
     }
 }
 

@@ -442,7 +442,7 @@ fn outcome_color(outcome: MapOutcome) -> Color {
         MapOutcome::NotConverged => Color(128, 128, 134),
         MapOutcome::Diverged => Color(32, 32, 36),
         MapOutcome::Refused => Color(240, 240, 242),
-        MapOutcome::OutOfTime => Color(0, 92, 158),
+        MapOutcome::OutOfTime => Color(104, 52, 128),
     }
 }
 
@@ -464,12 +464,14 @@ fn fill_outcome(page: &mut Drawing, cell: PageRectangle, outcome: MapOutcome) {
     let inset = 0.25 * cell.size;
     let (low, high) = (cell.corner + inset, cell.opposite_corner() - inset);
     let rising = (low.with_y(high.y), high.with_y(low.y));
+    let upright = (low.with_x(cell.middle().x), high.with_x(cell.middle().x));
     let level = (low.with_y(cell.middle().y), high.with_y(cell.middle().y));
     let (color, lines): (Color, &[(DVec2, DVec2)]) = match outcome {
         MapOutcome::Refused => (NOTE_COLOR, &[(low, high), rising]),
         MapOutcome::OtherEquilibrium => (NOTE_COLOR, &[(low, high)]),
         MapOutcome::NotConverged => (WHITE, &[rising]),
         MapOutcome::Inaccurate => (WHITE, &[level]),
+        MapOutcome::OutOfTime => (WHITE, &[upright]),
         _ => return,
     };
     for &(from, to) in lines {

@@ -10,7 +10,7 @@ pub(crate) mod drawing;
 mod fit;
 pub(crate) mod leaf;
 mod map;
-mod motion;
+pub(crate) mod motion;
 mod rod;
 pub(crate) mod scenario;
 mod sensitivity;
@@ -43,7 +43,7 @@ mod tests {
 
     use glam::DVec3;
     use leafdyn::relax::Mode;
-    use leafdyn::scenario::{Grip, PointLoad, Scenario, Schedule, SupportKind, Wind};
+    use leafdyn::scenario::{Grip, PointLoad, Profile, Scenario, Schedule, SupportKind, Wind};
     use leafdyn::simulate::{Record, Stopped};
 
     fn scenario() -> Scenario {
@@ -211,6 +211,48 @@ mod tests {
         }
     }
 
+    fn point_load(vein: usize, force: [f64; 3]) -> PointLoad {
+        PointLoad {
+            vein,
+            at: 0.4,
+            force,
+            moment: [0.0; 3],
+            follows: false,
+            mass: 0.0,
+            in_time: None,
+            landing: None,
+        }
+    }
+
+    #[test]
+    fn forces_and_couples_are_drawn_on_leaves_of_many_veins() {
+        let (fan, record) = (
+            sample::sample_equilibrium(5, 8),
+            sample::sample_record(5, 8),
+        );
+        let drawn = |scenario: &Scenario| {
+            let drawings = [leaf(&fan, scenario), filmstrip(&record, scenario)];
+            drawings.map(|it| formats::checked_svg_text(&it))
+        };
+        let paths = |svg: &[String; 2]| svg.each_ref().map(|it| it.matches("<path").count());
+        let free = paths(&drawn(&scenario()));
+        let panels = [4, record.stills.len()];
+        // No panel sees it end-on: everywhere a shaft and a head.
+        let mut loaded = scenario();
+        loaded.points = vec![point_load(3, [0.3, 0.2, -0.4])];
+        let svg = drawn(&loaded);
+        assert_eq!(paths(&svg), [0, 1].map(|k| free[k] + 2 * panels[k]));
+        assert!(svg[0].contains("arrow: force 0.5385"));
+        // An arc and its head at three places of every vein.
+        let mut turned = scenario();
+        let couple = [0.1, 0.2, 0.3].map(Profile::Constant);
+        turned.couple = Some(vec![couple; 5]);
+        assert_eq!(
+            paths(&drawn(&turned)),
+            [0, 1].map(|k| free[k] + 2 * 3 * 5 * panels[k])
+        );
+    }
+
     #[test]
     fn moments_are_drawn_on_a_rod_as_they_act() {
         let (rod, record) = (
@@ -224,14 +266,8 @@ mod tests {
         let mut turned = sample::sample_scenario("rod", 1);
         let [rest, moving] = drawn(&turned);
         turned.points = vec![PointLoad {
-            vein: 0,
-            at: 0.4,
-            force: [0.0; 3],
             moment: [0.3, 0.2, 0.1],
-            follows: false,
-            mass: 0.0,
-            in_time: None,
-            landing: None,
+            ..point_load(0, [0.0; 3])
         }];
         let pictures = record.stills.len();
         // An arc and its head in every panel, and one view at rest.

@@ -5,7 +5,7 @@ use crate::figure::drawing::axes::{Axis, NamedCurve, PanelAxes};
 use crate::figure::drawing::formats::rasterize;
 use crate::figure::drawing::labels::{Legend, LegendRows, new_page};
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, SMALL_LINE_WIDTH_FACTOR, SmallPanels, SpacePanel, common_bounding_box,
+    BoxMargins, SMALL_LINE_WIDTH_FACTOR, SmallPanels, SpacePanel, ViewAngles, common_bounding_box,
 };
 use crate::figure::drawing::veins::DrawnVeins;
 use crate::figure::drawing::{
@@ -18,7 +18,7 @@ use crate::report::numbers::{format_four_digits, number_in_unit};
 use glam::{DVec2, DVec3};
 use leafdyn::scenario::units::TIME;
 use leafdyn::scenario::{Scenario, Units};
-use leafdyn::simulate::{Energy, Record, ShapeSnapshot};
+use leafdyn::simulate::{Energy, OutputSample, Record, ShapeSnapshot};
 use rayon::prelude::*;
 use std::collections::HashMap;
 use std::io;
@@ -104,6 +104,18 @@ pub fn draw_energies(record: &Record, scenario: &Scenario) -> Drawing {
     drawing
 }
 
+/// A tip that moves by a smaller part of its distance from the origin is drawn from where it began.
+const SMALL_MOTION: f64 = 0.2;
+
+/// Where the tip began, if its whole motion is small beside its coordinates, which would hide it.
+pub fn small_motion_origin(moments: &[OutputSample]) -> Option<DVec3> {
+    let start = moments.first()?.tip;
+    let tips = || moments.iter().map(|moment| moment.tip);
+    let moved = tips().fold(0.0, |most: f64, tip| most.max(tip.distance(start)));
+    let farthest = tips().fold(0.0, |most: f64, tip| most.max(tip.length()));
+    (moved > 0.0 && moved < SMALL_MOTION * farthest).then_some(start)
+}
+
 /// Draws the coordinates of the joint tip, or the means of free ones.
 fn draw_tip_coordinates(
     page: &mut Drawing,
@@ -112,11 +124,13 @@ fn draw_tip_coordinates(
     cell: PageRectangle,
     end: f64,
 ) {
+    let origin = small_motion_origin(&record.moments);
+    let start = origin.unwrap_or_default();
     let coordinate = |axis: usize| NamedCurve {
         name: COORDINATE_NAMES[axis],
         color: CURVE_COLORS[axis],
         points: (record.moments.iter())
-            .map(|moment| (moment.time, moment.tip[axis]))
+            .map(|moment| (moment.time, (moment.tip - start)[axis]))
             .collect(),
     };
     let curves = [0, 1, 2].map(coordinate);
@@ -130,9 +144,11 @@ fn draw_tip_coordinates(
         &name,
         curves.iter().flat_map(NamedCurve::ordinates).chain([0.0]),
     );
-    let what = match record.joined {
-        true => "where the tip is",
-        false => "where the tips are, in the mean",
+    let what = match (record.joined, origin) {
+        (true, None) => "where the tip is",
+        (true, Some(_)) => "how far the tip is from where it began",
+        (false, None) => "where the tips are, in the mean",
+        (false, Some(_)) => "how far the tips are from where they began, in the mean",
     };
     let axes = PanelAxes::draw_titled(page, cell, ["(c)", what], across, up);
     let mut key = Legend::right_of(cell);
@@ -221,18 +237,26 @@ pub fn write_film(record: &Record, scenario: &Scenario, out: &mut dyn Write) -> 
         .map(|still| DrawnVeins::from_motion(record, still, scenario))
         .collect();
     let bounds = common_bounding_box(shapes.iter());
+    let view = ViewAngles::oblique(shapes.iter().map(DrawnVeins::tip_from_base));
     let times: Vec<f64> = (shown.iter())
         .map(|still| record.moments.get(still.moment).map_or(0.0, |m| m.time))
         .collect();
     let pictures: Vec<Vec<u8>> = (shapes.par_iter().zip(&times))
         .map_init(ColorPalette::new, |palette, (veins, time)| {
-            let text = format!("{}, t = {}", record.scenario, format_four_digits(*time));
+            let when = instant_text(*time, &scenario.units);
+            let text = format!("{}, {when}", record.scenario);
             palette.nearest_color_indices(&rasterize(&draw_picture(
-                veins, bounds, setting, &text, *time,
+                veins, bounds, view, setting, &text, *time,
             )))
         })
         .collect();
     encode_gif(&pictures, &picture_delays(&times), out).map_err(io::Error::other)
+}
+
+/// An instant as text.
+fn instant_text(time: f64, units: &Units) -> String {
+    let time = number_in_unit(format_four_digits(time), units, TIME);
+    format!("t = {time}")
 }
 
 /// At most `FILM.most_pictures` of the shapes, including the first and the last.
@@ -274,6 +298,7 @@ fn picture_delays(times: &[f64]) -> Vec<u16> {
 fn draw_picture(
     veins: &DrawnVeins,
     bounds: [DVec3; 2],
+    view: ViewAngles,
     setting: &FigureSetting,
     text: &str,
     time: f64,
@@ -284,7 +309,7 @@ fn draw_picture(
         DVec2::new(0.0, FILM.title_height),
         FILM.page - DVec2::new(0.0, FILM.title_height),
     );
-    let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, FILM.margins, None);
+    let scene = SpacePanel::new(bounds, setting, view, cell, FILM.margins, None);
     scene.draw_floor_and_walls(&mut page);
     scene.draw_axes(&mut page, 36.0);
     scene.draw_direction_arrows(&mut page, true, time);
@@ -456,16 +481,13 @@ pub fn draw_filmstrip(record: &Record, scenario: &Scenario) -> Drawing {
         since = still.moment;
         drawing.draw_group("instant", |page| {
             let time = record.moments.get(still.moment).map_or(0.0, |m| m.time);
-            let when = format!(
-                "t = {}",
-                number_in_unit(format_four_digits(time), &scenario.units, TIME)
-            );
+            let when = instant_text(time, &scenario.units);
             let caption = PanelCaption {
                 letter: &letter,
                 text: &when,
                 color: NOTE_COLOR,
             };
-            let scene = panels.draw_empty_panel(page, index, time, OBLIQUE_VIEW, caption);
+            let scene = panels.draw_empty_panel(page, index, time, panels.view, caption);
             for (path, stroke) in paths.iter().zip(strokes).rev() {
                 let path: Vec<_> = path
                     .iter()
@@ -499,6 +521,20 @@ fn tip_path(record: &Record, from: usize, to: usize) -> Vec<DVec3> {
 mod tests {
     use super::*;
     use crate::report::sample;
+
+    #[test]
+    fn a_tip_that_moves_little_is_drawn_from_where_it_began() {
+        let mut record = sample::sample_record(3, 4);
+        let start = record.moments[0].tip;
+        for (by, small) in [(1e-3, true), (0.1, true), (0.3, false), (0.0, false)] {
+            for (k, moment) in record.moments.iter_mut().enumerate() {
+                moment.tip = start + by * start.length() * (k % 2) as f64 * DVec3::Y;
+            }
+            let origin = small_motion_origin(&record.moments);
+            assert_eq!(origin, small.then_some(start), "{by}");
+        }
+        assert_eq!(small_motion_origin(&[]), None);
+    }
 
     #[test]
     fn what_is_always_zero_is_not_drawn() {
@@ -573,10 +609,13 @@ mod film_tests {
             .map(|it| DrawnVeins::from_motion(&record, it, &scenario))
             .collect();
         let bounds = common_bounding_box(shapes.iter());
+        let view = ViewAngles::oblique(shapes.iter().map(DrawnVeins::tip_from_base));
         for k in [0, 50, 100] {
             let time = record.moments[k].time;
             let text = format!("{}, t = {}", record.scenario, format_four_digits(time));
-            let painted = rasterize(&draw_picture(&shapes[k], bounds, &setting, &text, time));
+            let painted = rasterize(&draw_picture(
+                &shapes[k], bounds, view, &setting, &text, time,
+            ));
             let shown = pictures[k].chunks_exact(4);
             let pairs = shown.zip(painted.data().chunks_exact(4));
             let difference =

@@ -2,19 +2,17 @@
 //! its supports and its unloaded shape.
 
 use crate::figure::drawing::labels::{LegendRows, SUPPORT_NAMES, new_page};
-use crate::figure::drawing::markers::{
-    ForceArrow, RodPoint, draw_support_marker, draw_tip_marker, force_arrows,
-};
+use crate::figure::drawing::markers::{draw_support_marker, draw_tip_marker};
 use crate::figure::drawing::space::{
-    BoxMargins, OBLIQUE_VIEW, PlaneView, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT,
-    VIEW_FROM_SIDE, draw_plane_panel, padded_box,
+    BoxMargins, PlaneView, SpacePanel, VIEW_FROM_ABOVE, VIEW_FROM_FRONT, VIEW_FROM_SIDE,
+    ViewAngles, draw_plane_panel, padded_box,
 };
 use crate::figure::drawing::veins::{DrawnVeins, draw_vein_markers};
 use crate::figure::drawing::{
     Drawing, DrawingPath, FRAME_COLOR, PAGE, PageRectangle, PathStep, Stroke, TEXT_COLOR,
     curve_between_fractions, draw_panel_title, is_drawable, polyline_path,
 };
-use crate::figure::scenario::{FigureSetting, SupportForm, with_followers_as_dead};
+use crate::figure::scenario::{FigureSetting, SupportForm};
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
@@ -87,7 +85,6 @@ struct DrawnRod<'a> {
     unloaded_shape: Vec<DVec3>,
     /// Whether its end is left out.
     is_cut_off: bool,
-    forces: Vec<ForceArrow>,
 }
 
 /// Draws a single rod with its name and notes.
@@ -126,7 +123,8 @@ pub fn draw(
         None => {
             let cell = PageRectangle::new(corner, DVec2::new(width, LAYOUT.highest));
             let bounds = padded_box(low, high);
-            let scene = SpacePanel::new(bounds, setting, OBLIQUE_VIEW, cell, LAYOUT.margins, None);
+            let view = ViewAngles::oblique([veins.tip_from_base()]);
+            let scene = SpacePanel::new(bounds, setting, view, cell, LAYOUT.margins, None);
             page.draw_group("rod", |page| {
                 draw_panel_title(page, corner, "", "in space, with its shadow on the floor");
                 scene.draw_floor_and_walls(page);
@@ -184,25 +182,16 @@ impl<'a> DrawnRod<'a> {
             let count = unloaded.iter().take_while(near).count();
             unloaded.truncate(count);
         }
-        let loaded = with_followers_as_dead(scenario, leaf);
-        let forces = force_arrows(&loaded, veins.largest_extent(), |sigma| {
-            let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
-            Some(RodPoint {
-                position: point(sigma)?,
-                tangent: (there? - before?).normalize_or_zero(),
-            })
-        });
         DrawnRod {
             veins,
             unloaded_shape: if differs { unloaded } else { Vec::new() },
             is_cut_off: cut_off,
-            forces,
         }
     }
 
     /// Points that nothing else should cover.
     fn occupied_points(&self) -> impl Iterator<Item = DVec3> {
-        let arrows = self.forces.iter().flat_map(|force| force.ends);
+        let arrows = self.veins.forces.iter().flat_map(|force| force.ends);
         let unloaded = self.unloaded_shape.iter().copied();
         self.veins.piece_ends().chain(unloaded).chain(arrows)
     }
@@ -297,8 +286,9 @@ impl<'a> DrawnRod<'a> {
                 Stroke::new(vein.color, LAYOUT.line),
             );
         }
-        for force in &self.forces {
-            force.draw(page, cell, &place);
+        for force in &self.veins.forces {
+            force.draw(page, &place);
+            force.draw_label(page, cell, &place);
         }
         draw_vein_markers(page, self.veins, &place);
         let Some(pieces) = self.veins.veins.first().map(|vein| &vein.pieces) else {

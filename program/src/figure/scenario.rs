@@ -22,6 +22,10 @@ struct LoadArrows {
     /// how many such arrows there are.
     distributed: f64,
     distributed_count: usize,
+    /// Of more veins only some have such arrows.
+    most_veins: usize,
+    /// How many curved arrows a moment along a vein has, inside of its ends.
+    couple_count: usize,
 }
 
 const LOAD_ARROWS: LoadArrows = LoadArrows {
@@ -29,7 +33,29 @@ const LOAD_ARROWS: LoadArrows = LoadArrows {
     shortest: 0.35,
     distributed: 0.07,
     distributed_count: 9,
+    most_veins: 5,
+    couple_count: 3,
 };
+
+impl LoadArrows {
+    /// Fractions of a vein at which a force per length has its arrows.
+    fn places(&self) -> impl Iterator<Item = f64> + Clone {
+        let last = self.distributed_count - 1;
+        (0..=last).map(move |k| k as f64 / last as f64)
+    }
+
+    /// Fractions of a vein at which a moment per length has its arrows.
+    fn couple_places(&self) -> impl Iterator<Item = f64> + Clone {
+        let count = self.couple_count;
+        (1..=count).map(move |k| k as f64 / (count + 1) as f64)
+    }
+
+    /// Veins, from 0, on which forces and moments per length are drawn: both margins, and some between.
+    fn loaded_veins(&self, count: usize) -> impl Iterator<Item = usize> + Clone {
+        let shown = count.min(self.most_veins);
+        (0..shown).map(move |k| k * (count - 1) / (shown - 1).max(1))
+    }
+}
 
 /// What acts at a point of a vein.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -41,6 +67,8 @@ pub enum LoadKind {
     Distributed,
     /// A dead moment.
     Moment,
+    /// A dead moment per length.
+    Couple,
 }
 
 /// A dead load at a point of a vein, which is drawn as an arrow.
@@ -126,14 +154,13 @@ pub fn with_followers_as_dead<'s>(scenario: &'s Scenario, leaf: &Equilibrium) ->
         point.moment = turned(point.vein, point.at, point.moment);
         point.follows = false;
     }
-    if let Some(follower) = dead.follower.take() {
-        let last = LOAD_ARROWS.distributed_count - 1;
-        let at: Vec<f64> = (0..=last).map(|k| k as f64 / last as f64).collect();
-        let along = |vein: usize| {
+    // A load along the veins in the directions of their sections, besides a dead one.
+    let along = |following: &[[Profile; 3]], dead: Option<&Vec<[Profile; 3]>>, at: Vec<f64>| {
+        let of_vein = |vein: usize| {
             let values: Vec<[f64; 3]> = (at.iter())
                 .map(|&sigma| {
-                    let own = follower[vein].each_ref().map(|load| load.at(sigma));
-                    let dead = (scenario.distributed.as_ref()).map_or([0.0; 3], |all| {
+                    let own = following[vein].each_ref().map(|load| load.at(sigma));
+                    let dead = dead.map_or([0.0; 3], |all| {
                         all[vein].each_ref().map(|load| load.at(sigma))
                     });
                     let own = turned(vein, sigma, own);
@@ -145,7 +172,16 @@ pub fn with_followers_as_dead<'s>(scenario: &'s Scenario, leaf: &Equilibrium) ->
                 value: values.iter().map(|value| value[axis]).collect(),
             })
         };
-        dead.distributed = Some((0..follower.len()).map(along).collect());
+        (0..following.len()).map(of_vein).collect()
+    };
+    if let Some(follower) = dead.follower.take() {
+        let places = LOAD_ARROWS.places().collect();
+        dead.distributed = Some(along(&follower, scenario.distributed.as_ref(), places));
+    }
+    if let Some(couple) = dead.couple.take_if(|_| scenario.couple_follows) {
+        let places = [0.0].into_iter().chain(LOAD_ARROWS.couple_places());
+        dead.couple = Some(along(&couple, None, places.chain([1.0]).collect()));
+        dead.couple_follows = false;
     }
     Cow::Owned(dead)
 }
@@ -177,20 +213,32 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let moments = points.filter(|it| !it.follows);
     let moments = moments.map(|it| (it.vein + 1, it.at, DVec3::from_array(it.moment)));
     let moments: Vec<_> = moments.chain([(1, 1.0, tip_moment)]).collect();
-    let along = scenario.distributed.iter().flatten().zip(1..);
-    let along: Vec<_> = along
-        .flat_map(|(force, vein)| {
-            let at = (0..LOAD_ARROWS.distributed_count)
-                .map(|k| k as f64 / (LOAD_ARROWS.distributed_count - 1) as f64);
-            let of = |s: f64| DVec3::from_array(force.each_ref().map(|profile| profile.at(s)));
-            at.map(move |s| (vein, s, of(s)))
-        })
-        .collect();
+    let along = |load: Option<&Vec<[Profile; 3]>>, places: Vec<f64>| -> Vec<_> {
+        let of = |vein: usize, s: f64| {
+            load.map(|all| DVec3::from_array(all[vein].each_ref().map(|profile| profile.at(s))))
+        };
+        let loaded = LOAD_ARROWS.loaded_veins(veins);
+        let places = loaded.flat_map(|vein| places.iter().map(move |&s| (vein, s)));
+        let marks = places.filter_map(|(vein, s)| Some((vein + 1, s, of(vein, s)?)));
+        marks.collect()
+    };
+    let couple = (scenario.couple.as_ref()).filter(|_| !scenario.couple_follows);
+    let couples = along(couple, LOAD_ARROWS.couple_places().collect());
+    let along = along(
+        scenario.distributed.as_ref(),
+        LOAD_ARROWS.places().collect(),
+    );
     let kinds = [
         (LoadKind::Distributed, along, LOAD_ARROWS.distributed, 0.0),
         (
             LoadKind::Force,
             single,
+            LOAD_ARROWS.longest,
+            LOAD_ARROWS.shortest,
+        ),
+        (
+            LoadKind::Couple,
+            couples,
             LOAD_ARROWS.longest,
             LOAD_ARROWS.shortest,
         ),
@@ -281,7 +329,7 @@ pub struct FigureSetting {
 }
 
 /// A direction that is drawn as an arrow with its name.
-#[derive(Clone, Copy, Debug, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DirectionArrow {
     pub name: &'static str,
     /// Unit vector.
@@ -490,6 +538,7 @@ const MOST_KEYS_NAMED: usize = 3;
 /// A number of a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct QuantityLabel {
+    /// What it is.
     pub words: String,
     /// The unit, if the scenario names those of which it consists.
     pub unit: Option<String>,

@@ -5,9 +5,10 @@ use crate::figure::drawing::axes::{Axis, PanelAxes};
 use crate::figure::drawing::labels::{LabelPlacement, Legend, LegendText, new_page};
 use crate::figure::drawing::markers::Marker;
 use crate::figure::drawing::space::SmallPanels;
-use crate::figure::drawing::veins::{DrawnVeins, longest_curve};
+use crate::figure::drawing::veins::{DrawnVeins, longest_curve, magnify_displacements, vein_tips};
 use crate::figure::drawing::{
-    CURVE_COLORS, Drawing, PAGE, PageRectangle, Stroke, TEXT_COLOR, panel_letters,
+    CURVE_COLORS, Drawing, PAGE, PageRectangle, Stroke, TEXT_COLOR, curve_between_fractions,
+    panel_letters,
 };
 use crate::figure::scenario::{FigureSetting, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, vein_count_text};
@@ -46,6 +47,9 @@ const VISIBLE_DIFFERENCE: f64 = 0.04;
 /// Equal parts of each vein at whose ends leaves are compared.
 const COMPARED_PARTS_PER_VEIN: usize = 8;
 
+/// Least extent, in lengths, of a coordinate of the tip where other branches leave the one that is drawn.
+const BRANCHING_EXTENT: f64 = 0.5;
+
 /// Variations of the twist, in radians, and of tips, in lengths, that are rounding.
 const ROUNDING_VARIATION: f64 = 1e-7;
 
@@ -54,9 +58,12 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let shown = points_with_leaves(trace);
     let point = |&[b, p]: &[usize; 2]| &trace.branches[b].points[p];
     let longest = longest_curve(shown.iter().map(point).flat_map(|point| &point.curves));
-    let shapes: Vec<DrawnVeins> = (shown.iter().map(point))
-        .map(|point| {
-            DrawnVeins::from_curves(&point.curves, &point.tips, longest).with_supports(scenario)
+    let leaves: Vec<LeafOfTrace> = (shown.iter())
+        .map(|&at| LeafOfTrace::new(trace, at))
+        .collect();
+    let shapes: Vec<DrawnVeins> = (leaves.iter())
+        .map(|leaf| {
+            DrawnVeins::from_curves(&leaf.curves, &leaf.tips, longest).with_supports(scenario)
         })
         .collect();
     let varied = QuantityLabel::from_keys(&trace.keys.to_string(), &trace.units);
@@ -65,7 +72,11 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
         asked => asked.to_vec(),
     };
     let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
-    let mut drawing = new_page(PAGE.left_margin, &name, &header_notes(trace), None);
+    let mut notes = header_notes(trace);
+    if leaves.iter().any(|leaf| leaf.magnified.is_some()) {
+        notes.push("×: how much larger its buckling is drawn".into());
+    }
+    let mut drawing = new_page(PAGE.left_margin, &name, &notes, None);
     let mut letters = panel_letters();
     let mut letter = || letters.next().unwrap_or_default();
     let mut below = PAGE.header;
@@ -100,11 +111,61 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     drawing.height = panels.bottom();
     drawing.draw_group("leaves", |page| {
         for (index, (veins, at)) in shapes.iter().zip(&shown).enumerate() {
-            let caption = leaf_caption(point(at), varied.unit.as_deref());
+            let mut caption = leaf_caption(point(at), varied.unit.as_deref());
+            if let Some(factor) = leaves[index].magnified {
+                caption += &format!(" ×{}", format_four_digits(factor));
+            }
             panels.draw_leaf(page, index, veins, [&(index + 1).to_string(), &caption]);
         }
     });
     drawing
+}
+
+/// A leaf of a trace as it is drawn.
+struct LeafOfTrace {
+    curves: Vec<Vec<DVec3>>,
+    tips: Vec<DVec3>,
+    /// How much larger its displacement from where its branch begins is drawn.
+    magnified: Option<f64>,
+}
+
+impl LeafOfTrace {
+    /// The leaf of a point: on a branch that has just left another one, as it buckles.
+    fn new(trace: &Trace, [b, p]: [usize; 2]) -> Self {
+        let (branch, point) = (&trace.branches[b], &trace.branches[b].points[p]);
+        let mut curves = point.curves.clone();
+        let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
+        let magnified = origin.and_then(|origin| {
+            // Grids are nested: at the stations of the coarser one both have nodes.
+            let stations = match origin.stations.len() < point.stations.len() {
+                true => &origin.stations,
+                false => &point.stations,
+            };
+            let from = curves_at_stations(origin, stations);
+            let mut displaced = curves_at_stations(point, stations);
+            let factor = magnify_displacements(&mut displaced, &from)?;
+            curves = displaced;
+            Some(factor)
+        });
+        LeafOfTrace {
+            tips: match magnified {
+                Some(_) => vein_tips(&curves, point.tips.len() == 1),
+                None => point.tips.clone(),
+            },
+            curves,
+            magnified,
+        }
+    }
+}
+
+/// The curves of a point at these stations, which may be those of another grid.
+fn curves_at_stations(point: &TracePoint, stations: &[f64]) -> Vec<Vec<DVec3>> {
+    let at = |curve: &Vec<DVec3>| -> Vec<DVec3> {
+        let place =
+            |&sigma: &f64| curve_between_fractions(&point.stations, curve, [sigma; 2]).pop();
+        stations.iter().filter_map(place).collect()
+    };
+    point.curves.iter().map(at).collect()
 }
 
 fn header_notes(trace: &Trace) -> Vec<String> {
@@ -143,12 +204,18 @@ fn points_with_leaves(trace: &Trace) -> Vec<[usize; 2]> {
     }
     wanted.sort_by_key(|&(rank, _)| rank);
     let point = |[b, p]: [usize; 2]| &trace.branches[b].points[p];
+    // Every branch that has left another one shows how: magnified, if it has not gone far.
+    let is_magnified = |[b, p]: [usize; 2]| {
+        let is_last = p + 1 == trace.branches[b].points.len();
+        is_last && LeafOfTrace::new(trace, [b, p]).magnified.is_some()
+    };
     let mut shown: Vec<[usize; 2]> = Vec::new();
     for (_, at) in wanted {
         let alike = |&other: &[usize; 2]| {
             largest_leaf_distance(point(at), point(other)) <= VISIBLE_DIFFERENCE
         };
-        if shown.len() < LAYOUT.most_leaves && !shown.iter().any(alike) {
+        let is_new = is_magnified(at) || !shown.iter().any(alike);
+        if shown.len() < LAYOUT.most_leaves && is_new {
             shown.push(at);
         }
     }
@@ -207,6 +274,14 @@ fn most_varying_quantity(trace: &Trace) -> TraceShow {
         let ends = ends.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
         ends.map_or(0.0, |(low, high)| high - low)
     };
+    // Where a leaf buckles and no other branch is followed, its own branch does not move along the axis
+    // along which it buckles: that axis tells what happens.
+    let mut critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
+    let buckling = critical.find(|(_, point)| matches!(point.kind, PointKind::Branching(_)));
+    let axis = buckling.and_then(|(_, point)| point.critical_mode_axis);
+    if let (Some(axis), false, false, 0) = (axis, trace.switch, trace.held, trace.grips) {
+        return TraceShow::Tip(axis);
+    }
     let largest = shown
         .into_iter()
         .max_by(|a, b| change(*a).total_cmp(&change(*b)));
@@ -234,7 +309,12 @@ fn quantity_axis(trace: &Trace, quantity: TraceShow) -> Axis {
         tip => {
             let longest = longest_curve(points().take(1).flat_map(|point| &point.curves));
             let name = name_with_unit(&format!("{tip} of the tip"), units.length.as_deref());
-            (name, ROUNDING_VARIATION * longest)
+            // A branch that others leave has the room in which these would be.
+            let least = match passes_crossings(trace) {
+                true => BRANCHING_EXTENT,
+                false => ROUNDING_VARIATION,
+            };
+            (name, least * longest)
         }
     };
     Axis::linear_covering(&name, points().map(|point| point.figure_value(quantity)))
@@ -319,6 +399,13 @@ fn draw_branches(
 /// Draws the key: the branches, and the kinds of points that occur.
 fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
     let mut key = Legend::right_of(cell);
+    // How all of them end is said once.
+    let mut ends = trace
+        .branches
+        .iter()
+        .map(|branch| branch_end_phrase(&branch.end));
+    let first = ends.next();
+    let shared = first.filter(|first| trace.branches.len() > 1 && ends.all(|end| end == *first));
     let branches = trace.branches.iter().enumerate().map(|(b, branch)| {
         let name = match branch.from {
             None => "first branch".into(),
@@ -326,10 +413,16 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
         };
         LegendText {
             name,
-            note: branch_end_phrase(&branch.end).into(),
+            note: match shared {
+                Some(_) => String::new(),
+                None => branch_end_phrase(&branch.end).into(),
+            },
         }
     });
     key.add_curves(page, branches);
+    if let Some(end) = shared {
+        key.add_entry(page, "", &format!("all {end}"), |_, _| ());
+    }
     for CriticalMarker {
         marker,
         name,
@@ -339,7 +432,7 @@ fn draw_legend(page: &mut Drawing, trace: &Trace, cell: PageRectangle) {
         let mut critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
         if critical.any(|(_, point)| is_of_kind(point.kind)) {
             let how = match marker == Marker::Diamond && passes_crossings(trace) {
-                true => "--switch follows them",
+                true => "--switch follows the buckled ones",
                 false => "",
             };
             key.add_marker(page, name, how, marker, TEXT_COLOR);

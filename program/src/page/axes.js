@@ -49,7 +49,8 @@ function edges(box, place) {
   });
 }
 
-function drawAxes(pen, box, place, small) {
+/// Axes with ticks; in a small panel with names if it is the first: those of the others are the same.
+function drawAxes(pen, box, place, small, named) {
   const size = small ? 10 : 12;
   pen.lineWidth = 1;
   floor(pen, box, place);
@@ -78,7 +79,8 @@ function drawAxes(pen, box, place, small) {
     }
     pen.fillStyle = css("--ink");
     pen.font = font(size + 1);
-    const away = Math.abs(out[0]) > 0.5 ? 20 + widest : 32;
+    if (!named) continue;
+    const away = Math.abs(out[0]) > 0.5 ? 20 + widest : small ? 27 : 32;
     const name = withUnit(AXIS_NAMES[axis], lengthUnit);
     pen.fillText(name, (p[0] + q[0]) / 2 + away * out[0], (p[1] + q[1]) / 2 + away * out[1]);
   }
@@ -109,9 +111,12 @@ function line(pen, p, q) {
   pen.stroke();
 }
 
+/// What they are for a leaf: of an instant of a motion the wind may be another.
+const directionsOf = (leaf) => leaf.directions || view.directions;
+
 /// The directions of gravity and wind as arrows of fixed size beside each other, from a corner of the panel on.
-function drawDirections(pen, box, place, [x, y], step) {
-  view.directions.forEach((it, k) => drawDirection(pen, box, place, [x + k * step, y], it));
+function drawDirections(pen, box, place, [x, y], step, leaf) {
+  directionsOf(leaf).forEach((it, k) => drawDirection(pen, box, place, [x + k * step, y], it));
 }
 
 function drawDirection(pen, box, place, at, { name, direction }) {
@@ -155,7 +160,7 @@ function drawScale(pen, quantity, limits, map, width, height) {
   if (byVein && veins < 2) return;
   for (let i = 0; i < wide; i++) {
     const t = i / (wide - 1);
-    const color = byVein ? rgb(view.colors[Math.min(veins - 1, Math.floor(t * veins))]) : colorOf(map, t);
+    const color = byVein ? visible(rgb(view.colors[Math.min(veins - 1, Math.floor(t * veins))])) : colorOf(map, t);
     pen.fillStyle = `rgb(${color.map((x) => Math.round(255 * x)).join(",")})`;
     pen.fillRect(left + i, top, 1.5, high);
   }

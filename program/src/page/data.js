@@ -102,7 +102,20 @@ const DIVERGING = ["#0b5fa5", "#4a90c8", "#9dbfd8", "#c9c9cb", "#e0ad8f", "#d874
 const rgb = (hex) => [1, 3, 5].map((k) => parseInt(hex.slice(k, k + 2), 16) / 255);
 const MAPS = { sequential: VIRIDIS.map(rgb), signed: DIVERGING.map(rgb) };
 
-function colorOf(map, t) {
+/// The least light, of 1, that a colour has on a dark page: darker ones are mixed with white until they have it.
+const LEAST_LIGHT = 0.34;
+
+/// A colour as the theme shows it: visible on its paper.
+function visible(color) {
+  if (document.documentElement.dataset.theme !== "dark") return color;
+  const light = 0.3 * color[0] + 0.59 * color[1] + 0.11 * color[2];
+  const part = Math.max(0, (LEAST_LIGHT - light) / (1 - light));
+  return color.map((x) => x + part * (1 - x));
+}
+
+const colorOf = (map, t) => visible(between(map, t));
+
+function between(map, t) {
   const place = Math.min(Math.max(t, 0), 1) * (map.length - 1);
   const left = Math.min(Math.floor(place), map.length - 2);
   const part = place - left;

@@ -33,6 +33,8 @@ pub struct PageData {
     pub loads: Vec<LoadMark>,
     /// What is held: bases, a tip, and what grips hold.
     pub holds: Vec<SupportMark>,
+    /// The unit vector toward the viewer in the view with which the page begins.
+    pub toward: Option<DVec3>,
     /// The length of the longest vein.
     pub longest: f64,
     /// Whether the tips share one point.
@@ -64,9 +66,16 @@ pub struct PageLeaf {
     /// Its time, in a motion.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub time: Option<f64>,
-    /// The dead loads at this time of a motion, where they are others.
+    /// The dead loads on this leaf, where they are others: at its time of a motion, or as loads that turn
+    /// with the section act on it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loads: Option<Vec<LoadMark>>,
+    /// The directions of weight and wind at its time of a motion, where they are others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub directions: Option<Vec<DirectionArrow>>,
+    /// From the mean of the bases to that of the tips.
+    #[serde(skip)]
+    pub tip_from_base: DVec3,
     /// Fractions of the length, where they are known.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stations: Option<Vec<f64>>,
@@ -157,6 +166,7 @@ impl PageLeaf {
         }
         PageLeaf {
             label,
+            tip_from_base: tip_from_base(&leaf.shape.curves),
             nodes: stations.len(),
             stations: Some(stations.clone()),
             points: EncodedPoints::Full {
@@ -176,6 +186,7 @@ impl PageLeaf {
         view: &PageData,
         most: usize,
     ) -> Self {
+        let all_curves = curves;
         let nodes = curves.first().map_or(0, Vec::len);
         let stride = node_stride(nodes, most);
         let curves = view.drawn.iter().map(|&number| &curves[number - 1]);
@@ -192,6 +203,7 @@ impl PageLeaf {
         let steps = steps.flat_map(|x| (x as u16).to_le_bytes());
         PageLeaf {
             label,
+            tip_from_base: tip_from_base(all_curves),
             nodes: nodes.saturating_sub(1) / stride + 1,
             stations: are_unequally_spaced(stations)
                 .then(|| stations.iter().step_by(stride).copied().collect()),
@@ -203,6 +215,14 @@ impl PageLeaf {
             ..PageLeaf::default()
         }
     }
+}
+
+/// From the mean of the first points of these curves to that of their last points.
+fn tip_from_base(curves: &[Vec<DVec3>]) -> DVec3 {
+    let ends = curves
+        .iter()
+        .filter_map(|it| Some(*it.last()? - *it.first()?));
+    ends.sum::<DVec3>() / curves.len().max(1) as f64
 }
 
 /// Whether these are not equally spaced, which the page assumes by default.

@@ -26,15 +26,17 @@ pub mod vtk;
 
 use crate::figure::FigureFunction;
 use crate::figure::drawing::formats::{escape_xml, hex_color, write_svg};
+use crate::figure::drawing::space::ViewAngles;
 use crate::figure::drawing::veins::is_vein_drawn;
 use crate::figure::drawing::{Drawing, color_of_vein};
+pub use crate::figure::scenario::QuantityLabel;
 use crate::figure::scenario::{FigureSetting, LoadMark, load_marks, support_marks};
 pub use crate::page::data::{PageData, PageLeaf};
 use crate::report;
 use crate::report::ReportedResult;
 use glam::DVec3;
 use leafdyn::scenario;
-use leafdyn::scenario::{Scenario, Units};
+use leafdyn::scenario::Scenario;
 use leafdyn::simulate::Record;
 use leafdyn::study::Trace;
 use std::io;
@@ -64,7 +66,7 @@ pub trait PageResult: ReportedResult {
 
     /// Fills in the data of the page.
     #[doc(hidden)]
-    fn fill_page_data(&self, view: &mut PageData, units: &Units);
+    fn fill_page_data(&self, view: &mut PageData, scenario: &Scenario);
 }
 
 /// A shape of the leaf among several.
@@ -121,13 +123,19 @@ pub fn html_page<R: PageResult>(result: &R, scenario: &Scenario) -> String {
 pub fn page_data<R: PageResult>(result: &R, scenario: &Scenario) -> PageData {
     let mut view = page_data_without_result(scenario);
     view.summary = result.summary(&scenario.units);
-    result.fill_page_data(&mut view, &scenario.units);
+    result.fill_page_data(&mut view, scenario);
+    let setting = FigureSetting::from_scenario(scenario);
     for leaf in &mut view.leaves {
-        let loads = leaf
-            .time
-            .map(|time| loads_on_drawn_veins(scenario, Some(time)));
-        leaf.loads = loads.filter(|loads| *loads != view.loads);
+        if let Some(time) = leaf.time {
+            leaf.loads = Some(loads_on_drawn_veins(scenario, Some(time)));
+            leaf.directions = Some(setting.direction_arrows(true, time));
+        }
+        leaf.loads.take_if(|loads| *loads == view.loads);
+        leaf.directions.take_if(|arrows| *arrows == view.directions);
     }
+    let tips = view.leaves.iter().map(|leaf| leaf.tip_from_base);
+    let oblique = ViewAngles::oblique(tips).toward_viewer();
+    view.toward.get_or_insert(oblique);
     view
 }
 
@@ -155,6 +163,7 @@ pub fn page_data_without_result(scenario: &Scenario) -> PageData {
         holds: (support_marks(scenario).into_iter())
             .filter(|mark| is_vein_drawn(mark.vein - 1, count))
             .collect(),
+        toward: None,
         longest: scenario::longest(&scenario.rods),
         lengths: (drawn.iter().map(|&number| scenario.rods[number - 1].length)).collect(),
         joined: scenario.joined,
@@ -168,16 +177,29 @@ pub fn page_data_without_result(scenario: &Scenario) -> PageData {
 }
 
 /// The loads on the veins that are drawn.
-fn loads_on_drawn_veins(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
+pub(crate) fn loads_on_drawn_veins(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     let count = scenario.rods.len();
     let mut loads = load_marks(scenario, time);
     loads.retain(|mark| is_vein_drawn(mark.vein - 1, count));
     loads
 }
 
-/// A leaf in motion, as centerlines with nodes at these stations, for the page of its scenario.
-pub fn moving_leaf(stations: &[f64], curves: &[Vec<DVec3>], page: &PageData) -> PageLeaf {
-    PageLeaf::from_centerlines(String::new(), stations, curves, page, usize::MAX)
+/// A leaf in motion at this time, as centerlines with nodes at these stations, for the page of its
+/// scenario.
+pub fn moving_leaf(
+    stations: &[f64],
+    curves: &[Vec<DVec3>],
+    page: &PageData,
+    scenario: &Scenario,
+    time: f64,
+) -> PageLeaf {
+    let arrows = FigureSetting::from_scenario(scenario).direction_arrows(true, time);
+    PageLeaf {
+        directions: Some(arrows).filter(|arrows| *arrows != page.directions),
+        loads: Some(loads_on_drawn_veins(scenario, Some(time)))
+            .filter(|loads| *loads != page.loads),
+        ..PageLeaf::from_centerlines(String::new(), stations, curves, page, usize::MAX)
+    }
 }
 
 fn assemble_html(view: &PageData, still: &Drawing) -> String {
@@ -286,7 +308,8 @@ mod tests {
         assert!(!names.contains(&"work put in"), "{names:?}");
         // In the unit of lengths; that of forces has no name.
         let choices = &data["chart"]["choices"];
-        assert_eq!(*choices, serde_json::json!(["energy", "tip / cm"]));
+        let tip = "tip, from where it began / cm";
+        assert_eq!(*choices, serde_json::json!(["energy", tip]));
     }
 
     #[test]

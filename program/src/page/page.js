@@ -9,7 +9,9 @@ let diagram = null;
 function fillText() {
   const stable = find("verdict");
   stable.textContent = view.verdict;
-  stable.classList.toggle("bad", !view.success || /unstable|index/.test(view.verdict));
+  // Green is what is known to be stable, and nothing else.
+  const bad = !view.success || /unstable|index/.test(view.verdict);
+  stable.className = bad ? "bad" : /^stable/.test(view.verdict) ? "good" : "";
   const many = view.rods === 1 ? "1 vein" : `${view.rods} veins${view.joined ? " joined at the tip" : " with free tips"}`;
   const part = view.drawn.length < view.rods ? `, ${view.drawn.length} drawn` : "";
   find("what").textContent = many + part;
@@ -50,6 +52,7 @@ function currentLeaves() {
 /// Brings everything up to date: `again` after a setting has changed.
 function update(again) {
   leaves = currentLeaves();
+  if (leaves.length) showDirections(leaves[0]);
   if (space) space.panels = leaves.map((leaf, i) => ({ leaf, mesh: put(i, leaf, again), label: several ? leaf.label : "" }));
   shown.dirty = true;
   if (again) shown.stale = true;
@@ -183,7 +186,10 @@ function choose(event) {
 }
 
 function listen() {
-  find("theme").addEventListener("click", () => setTheme(root.dataset.theme === "dark" ? "light" : "dark"));
+  find("theme").addEventListener("click", () => {
+    setTheme(root.dataset.theme === "dark" ? "light" : "dark");
+    if (view.leaves.length) update(true);
+  });
   find("quantity").addEventListener("change", () => {
     shown.quantity = Number(find("quantity").value);
     update(true);

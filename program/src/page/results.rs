@@ -3,16 +3,22 @@
 
 use crate::figure;
 use crate::figure::FigureFunction;
-use crate::figure::scenario::name_with_unit;
-use crate::page::PageResult;
+use crate::figure::drawing::space::ViewAngles;
+use crate::figure::drawing::veins::DrawnVeins;
+use crate::figure::leaf::mode_text;
+use crate::figure::motion::small_motion_origin;
+use crate::figure::scenario::{LoadMark, name_with_unit, with_followers_as_dead};
 use crate::page::data::{ModeShape, PageChart, PageCurve, PageData, PageLeaf, encode_vectors};
+use crate::page::{PageResult, loads_on_drawn_veins};
 use crate::report::numbers::{
     count_in_words, format_five_digits, format_four_digits, format_ten_digits,
 };
-use crate::report::{ReportedResult, equilibrium_kind, is_codimension_two, relaxation_verdict};
+use crate::report::{
+    ReportedResult, equilibrium_kind, is_codimension_two, relaxation_verdict, stability_phrase,
+};
 use glam::DVec3;
 use leafdyn::relax::{Equilibrium, Mode};
-use leafdyn::scenario::Units;
+use leafdyn::scenario::{Scenario, Units};
 use leafdyn::simulate::{OutputSample, Record};
 use leafdyn::study::{
     BoundaryPoint, Equilibria, ParameterKeys, PointKind, StabilityBoundary, Trace, TraceBranch,
@@ -34,35 +40,40 @@ const MOST_CURVE_POINTS: usize = 1000;
 impl PageResult for Equilibrium {
     const FALLBACK_FIGURE: FigureFunction<Self> = figure::leaf;
 
-    fn fill_page_data(&self, view: &mut PageData, _: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, scenario: &Scenario) {
         view.verdict = relaxation_verdict(self);
         view.success = self.outcome.is_success();
-        view.leaves
-            .push(PageLeaf::with_node_states("at rest".into(), self, view));
+        view.leaves.push(PageLeaf {
+            loads: Some(loads_on_leaf(self, scenario)),
+            ..PageLeaf::with_node_states("at rest".into(), self, view)
+        });
         if self.stability.mode_shapes {
             let modes = self.stability.modes.iter().flatten().enumerate();
             view.modes = modes
-                .map(|(k, mode)| mode_shape(self, k + 1, mode, &view.drawn))
+                .map(|(k, mode)| mode_shape(self, k + 1, mode, &view.drawn, &scenario.units))
                 .collect();
         }
     }
 }
 
-fn mode_shape(leaf: &Equilibrium, number: usize, mode: &Mode, drawn: &[usize]) -> ModeShape {
-    let what = match (mode.is_neutral(), mode.growth()) {
-        (true, _) => "neutral".into(),
-        (_, Some(growth)) => format!("unstable, grows at {}", format_four_digits(growth)),
-        (_, None) => format!(
-            "ω = {}",
-            format_four_digits(mode.frequency().unwrap_or_default())
-        ),
-    };
+/// The loads on a leaf at rest, those that turn with its sections among them.
+fn loads_on_leaf(leaf: &Equilibrium, scenario: &Scenario) -> Vec<LoadMark> {
+    loads_on_drawn_veins(&with_followers_as_dead(scenario, leaf), None)
+}
+
+fn mode_shape(
+    leaf: &Equilibrium,
+    number: usize,
+    mode: &Mode,
+    drawn: &[usize],
+    units: &Units,
+) -> ModeShape {
     let pick = |of: &[Vec<DVec3>]| {
         let chosen = drawn.iter().filter_map(|&number| of.get(number - 1));
         encode_vectors(chosen.flatten().copied())
     };
     ModeShape {
-        label: format!("mode {number}: {what}"),
+        label: format!("mode {number}: {}", mode_text(mode, units)),
         nodes: mode.displacement.first().map_or(0, Vec::len),
         rest: pick(&leaf.shape.curves),
         displacement: pick(&mode.displacement),
@@ -73,7 +84,8 @@ impl PageResult for Equilibria {
     const FALLBACK_FIGURE: FigureFunction<Self> = figure::equilibria;
 
     /// Lists all equilibria, to be shown side by side.
-    fn fill_page_data(&self, view: &mut PageData, units: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, scenario: &Scenario) {
+        let units = &scenario.units;
         view.kind = "equilibria";
         let count = self.found.len();
         view.verdict = count_in_words(count, "equilibrium", "equilibria");
@@ -81,13 +93,19 @@ impl PageResult for Equilibria {
             view.verdict += &format!(", the first {MOST_EQUILIBRIA_SHOWN} shown");
         }
         view.success = count > 0;
+        let shown = self.found.iter().take(MOST_EQUILIBRIA_SHOWN);
+        let shapes = shown.map(|it| DrawnVeins::from_equilibrium(&it.equilibrium, scenario));
+        let shapes: Vec<DrawnVeins> = shapes.collect();
+        view.toward = Some(ViewAngles::telling_apart(&shapes).toward_viewer());
         for (k, found) in self.found.iter().take(MOST_EQUILIBRIA_SHOWN).enumerate() {
             let leaf = &found.equilibrium;
-            let kind = equilibrium_kind(leaf.stability.negative_eigenvalues);
+            let kind = leaf.stability.negative_eigenvalues;
+            let kind = kind.map_or("stability unknown".into(), stability_phrase);
             let energy = format_four_digits(leaf.energy.unwrap_or(f64::NAN));
-            let label = format!("{}. {kind}, energy {energy}", k + 1);
+            let label = format!("{}. energy {energy}, {kind}", k + 1);
             view.leaves.push(PageLeaf {
                 summary: leaf.summary(units),
+                loads: Some(loads_on_leaf(leaf, scenario)),
                 ..PageLeaf::with_node_states(label, leaf, view)
             });
         }
@@ -97,7 +115,8 @@ impl PageResult for Equilibria {
 impl PageResult for Record {
     const FALLBACK_FIGURE: FigureFunction<Self> = figure::filmstrip;
 
-    fn fill_page_data(&self, view: &mut PageData, units: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, scenario: &Scenario) {
+        let units = &scenario.units;
         view.kind = "motion";
         view.verdict = match self.stopped {
             None => format!("followed to t = {}", format_four_digits(self.time)),
@@ -152,13 +171,20 @@ fn motion_chart(moments: &[OutputSample], units: &Units) -> PageChart {
     // An energy that is always zero needs no curve.
     let energies = energies.filter(|curve| curve.y.iter().any(|&y| y != 0.0));
     let tip = ["tip x", "tip y", "tip z"].into_iter().enumerate();
-    let tip = tip.map(|(axis, name)| curve(1, axis, name, &|m: &OutputSample| m.tip[axis]));
+    let origin = small_motion_origin(moments);
+    let start = origin.unwrap_or_default();
+    let tip =
+        tip.map(|(axis, name)| curve(1, axis, name, &|m: &OutputSample| (m.tip - start)[axis]));
+    let way = match origin {
+        Some(_) => "tip, from where it began",
+        None => "tip",
+    };
     PageChart {
         across: "time".into(),
         log: false,
         choices: vec![
             name_with_unit("energy", units.energy().as_deref()),
-            name_with_unit("tip", units.length.as_deref()),
+            name_with_unit(way, units.length.as_deref()),
         ],
         curves: energies.chain(tip).collect(),
     }
@@ -167,7 +193,8 @@ fn motion_chart(moments: &[OutputSample], units: &Units) -> PageChart {
 impl PageResult for Trace {
     const FALLBACK_FIGURE: FigureFunction<Self> = figure::trace;
 
-    fn fill_page_data(&self, view: &mut PageData, units: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, scenario: &Scenario) {
+        let units = &scenario.units;
         view.kind = "trace";
         drop_varied_loads(view, slice::from_ref(&self.keys));
         let count = self.branches.len();
@@ -275,7 +302,7 @@ fn number_curves(what: &str, mut curves: Vec<PageCurve>) -> Vec<PageCurve> {
 impl PageResult for StabilityBoundary {
     const FALLBACK_FIGURE: FigureFunction<Self> = figure::boundary;
 
-    fn fill_page_data(&self, view: &mut PageData, _: &Units) {
+    fn fill_page_data(&self, view: &mut PageData, _: &Scenario) {
         view.kind = "trace";
         drop_varied_loads(view, &self.keys);
         let count = count_in_words(self.curves.len(), "curve", "curves");

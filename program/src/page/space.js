@@ -97,9 +97,10 @@ class LeafMesh {
     const accent = new THREE.MeshLambertMaterial({ vertexColors: true });
     this.tips = Array.from({ length: view.joined ? 1 : veins }, () => ball(accent));
     this.holds = holdMarks(leaf, this);
+    this.bars = clampBars(leaf, this);
     this.loads = [];
     this.group = new THREE.Group();
-    this.group.add(this.tubes, this.surface, ...this.tips, ...this.holds.map(({ mark }) => mark));
+    this.group.add(this.tubes, this.surface, ...this.tips, ...[...this.holds, ...this.bars].map(({ mark }) => mark));
     for (const part of [this.tubes, this.surface]) part.frustumCulled = false;
   }
 
@@ -132,6 +133,7 @@ class LeafMesh {
     // A tip that is held has the mark of its holder.
     this.tips.forEach((tip) => (tip.visible = !view.holds.some(({ part }) => part === "tip")));
     this.holds.forEach(({ mark, place }) => mark.position.fromArray(this.points, place));
+    this.bars.forEach(({ mark, places }) => layBetween(mark, places.map((place) => new THREE.Vector3().fromArray(this.points, place))));
     this.load(leaf);
     const membrane = this.surface.geometry;
     membrane.attributes.position.needsUpdate = true;
@@ -176,7 +178,7 @@ class LeafMesh {
     const { fine, sub, nodes } = this;
     const color = this.tubes.geometry.attributes.color;
     for (let j = 0; j < veins; j++) {
-      const own = linear(rgb(view.colors[j]));
+      const own = linear(visible(rgb(view.colors[j])));
       for (let i = 0; i < fine; i++) {
         let c = own;
         if (values) {
@@ -193,7 +195,7 @@ class LeafMesh {
 
   /// The parts that have one colour each.
   theme() {
-    for (const { mark } of this.holds) mark.material.color.set(css("--clamp"));
+    for (const { mark } of [...this.holds, ...this.bars]) mark.material.color.set(css("--clamp"));
     for (const { mark } of this.loads) paintMark(mark);
     this.tips.forEach((tip) => tip.material.color.set(css("--accent")));
     this.surface.material.color.set(css("--membrane"));
@@ -227,8 +229,29 @@ function holdMarks(leaf, mesh) {
   });
 }
 
+/// Bars between the clamps of neighbouring veins whose bases are apart.
+function clampBars(leaf, mesh) {
+  const clamps = view.holds.filter(({ part, held, vein }) => part === "base" && held === "clamped" && view.drawn.includes(vein));
+  const bar = plain(new THREE.CylinderGeometry(3 * radius, 3 * radius, 1, 16).rotateX(Math.PI / 2));
+  const places = clamps.map(({ vein }) => placeOf(vein, 0, leaf, mesh));
+  return places.slice(1).map((place, i) => ({ places: [places[i], place], mark: bar(new THREE.MeshLambertMaterial({ vertexColors: true })) }));
+}
+
+/// Lays a mark that is one long along z between two points.
+function layBetween(mark, [from, to]) {
+  const way = to.clone().sub(from);
+  mark.visible = way.length() > 1e-9 * view.longest;
+  mark.position.copy(from).lerp(to, 0.5);
+  if (!mark.visible) return;
+  mark.scale.z = way.length();
+  mark.quaternion.setFromUnitVectors(new THREE.Vector3(0, 0, 1), way.normalize());
+}
+
 /// Radius of the curved arrow of a moment, and pieces of it along and around.
 const TURN = { radius: 0.06, angle: 1.5 * Math.PI, along: 24, around: 6 };
+
+/// Whether it is a moment, or one per length.
+const turns = (action) => action === "moment" || action === "couple";
 
 /// The arrow of a load: along z from the origin, turned to its direction. That of a moment is curved about it.
 function loadMark({ action, direction, length }) {
@@ -237,7 +260,7 @@ function loadMark({ action, direction, length }) {
   const head = new THREE.ConeGeometry(3 * thick, 8 * thick, 12).rotateX(Math.PI / 2);
   const material = new THREE.MeshLambertMaterial({ vertexColors: true });
   const [reach, size] = [length * view.longest, 8 * thick];
-  if (action === "moment") {
+  if (turns(action)) {
     const [tube, tip] = [plain(curved(thick))(material), plain(head)(material)];
     const ring = TURN.radius * view.longest;
     tip.position.set(ring * Math.cos(TURN.angle), ring * Math.sin(TURN.angle), 0);
@@ -272,7 +295,7 @@ function curved(thick) {
 function tailOf({ action, vein, at, direction, length }, leaf, mesh) {
   const place = placeOf(vein, at, leaf, mesh);
   const point = [...mesh.points.subarray(place, place + 3)];
-  if (action === "moment") return point;
+  if (turns(action)) return point;
   const first = placeOf(vein, 0, leaf, mesh);
   const before = Math.max(first, place - 3);
   const tangent = [0, 1, 2].map((k) => mesh.points[before + 3 + k] - mesh.points[before + k]);

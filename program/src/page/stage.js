@@ -107,9 +107,16 @@ function redraw() {
   shown.dirty = shown.stale = true;
 }
 
+/// Draws the directions anew where those of a leaf are others than those that are drawn.
+function showDirections(leaf) {
+  const now = JSON.stringify(directionsOf(leaf));
+  if (now !== shown.directions) shown.stale = true;
+  shown.directions = now;
+}
+
 /// Looks from a direction, at all of the box.
 function look(name) {
-  const from = { free: [-0.55, -1, 0.75], above: [0, -1e-4, 1], side: [0, -1, 0], front: [1, 0, 0] }[name];
+  const from = { free: view.toward, above: [0, -1e-4, 1], side: [0, -1, 0], front: [1, 0, 0] }[name];
   const { camera, controls, box } = space;
   controls.target.fromArray(box.middle);
   const away = new THREE.Vector3(...from).normalize().multiplyScalar(10 * box.extent);
@@ -132,18 +139,22 @@ function fitBox() {
   space.fit = [extent(right), extent(up)];
 }
 
+/// What several panels leave free: above them the buttons of the views, below the arrows of directions and the colour scale.
+const AROUND = { above: 46, below: 66 };
+
 /// Rectangles of the panels on the stage.
 function layout(width, height) {
   const count = space.panels.length;
+  const [top, room] = count > 1 ? [AROUND.above, Math.max(120, height - AROUND.above - AROUND.below)] : [0, height];
   let best = { scale: 0 };
   for (let columns = 1; columns <= count; columns++) {
     const rows = Math.ceil(count / columns);
-    const [w, h] = [width / columns, height / rows];
+    const [w, h] = [width / columns, room / rows];
     const scale = Math.min(w / space.fit[0], h / space.fit[1]);
     if (scale > best.scale) best = { scale, columns, w, h };
   }
   space.panels.forEach((panel, i) => {
-    panel.rect = [(i % best.columns) * best.w, Math.floor(i / best.columns) * best.h, best.w, best.h];
+    panel.rect = [(i % best.columns) * best.w, top + Math.floor(i / best.columns) * best.h, best.w, best.h];
   });
 }
 
@@ -164,12 +175,13 @@ function placeIn(panel) {
 function frustum(width, height) {
   const { camera, fit } = space;
   const small = space.panels.length > 1;
-  const [marginX, marginY] = small ? [30, 34] : find("axes").checked ? [90, 78] : [40, 50];
-  const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - 2 * marginY) / fit[1]);
+  // A title stands above a small panel, names of axes below the box of a large one.
+  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 76, 70] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
+  const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - above - below) / fit[1]);
   camera.right = width / 2 / scale;
   camera.left = -camera.right;
-  camera.top = height / 2 / scale;
-  camera.bottom = -camera.top;
+  camera.top = (height + above - below) / 2 / scale;
+  camera.bottom = camera.top - height / scale;
   camera.updateProjectionMatrix();
 }
 
@@ -227,8 +239,8 @@ function drawUnder(width, height, ratio) {
   const small = space.panels.length > 1;
   for (const panel of space.panels) {
     const place = placeIn(panel);
-    if (find("axes").checked) drawAxes(pen, space.box, place, small);
-    if (panel === space.panels[0]) drawDirections(pen, space.box, place, small ? [width - 44, 32] : [44, height - 64], small ? -76 : 76);
+    if (find("axes").checked) drawAxes(pen, space.box, place, small, !small || panel === space.panels[0]);
+    if (panel === space.panels[0]) drawDirections(pen, space.box, place, [44, height - (small ? 46 : 64)], 76, panel.leaf);
     if (panel.label) drawLabel(pen, panel, small);
   }
   const colors = quantity();
@@ -241,7 +253,20 @@ function drawLabel(pen, panel, small) {
   pen.font = font(small ? 12 : 14);
   pen.textAlign = "center";
   pen.textBaseline = "top";
-  pen.fillText(panel.label, left + width / 2, top + (small && top > 0 ? 6 : 46), width - 12);
+  // In two lines where one is too long, and never in the next panel.
+  const [first, second] = pen.measureText(panel.label).width > width - 12 ? twoLines(panel.label) : [panel.label, ""];
+  const y = top + (small ? 4 : 46);
+  pen.fillText(first, left + width / 2, y, width - 12);
+  pen.fillText(second, left + width / 2, y + 15, width - 12);
+}
+
+/// A text divided at the comma or the space nearest to its middle.
+function twoLines(text) {
+  const middle = text.length / 2;
+  const breaks = [...text.matchAll(/ /g)].map(({ index }) => [Math.abs(index - middle) - (text[index - 1] === "," ? middle / 2 : 0), index]);
+  if (!breaks.length) return [text, ""];
+  const [, at] = breaks.reduce((a, b) => (b[0] < a[0] ? b : a));
+  return [text.slice(0, at), text.slice(at + 1)];
 }
 
 /// The node nearest to a place on the stage.
@@ -378,6 +403,7 @@ function inMode(mode, amplitude) {
 function setTheme(name) {
   root.dataset.theme = name;
   themed.clear();
+  if (space) space.meshes.forEach((mesh) => (mesh.painted = null));
   find("theme").textContent = name === "dark" ? "light" : "dark";
   redraw();
   if (space) space.meshes.forEach((mesh) => mesh.theme());

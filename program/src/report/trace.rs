@@ -97,7 +97,9 @@ const MANY_STABILITY_LOSSES: usize = 3;
 fn option_advice(trace: &Trace) -> Vec<String> {
     let mut advice = Vec::new();
     if passes_crossings(trace) {
-        advice.push("branches cross here that are not followed: --switch follows them".into());
+        advice.push(
+            "branches cross here that are not followed: --switch follows the buckled ones".into(),
+        );
     }
     if trace.until.is_none() {
         let losses = trace.branches.iter().map(TraceBranch::index_increase_count);

@@ -151,3 +151,19 @@ fn leaves_are_drawn_only_where_they_look_different() {
         assert_eq!(leaves.matches(">at ").count(), count, "to {to}");
     }
 }
+
+/// A leaf that buckles, without the branches into which it does: drawn is the coordinate along which it buckles, with the room in which
+/// they would be, and what would draw them.
+#[test]
+fn a_branch_that_is_left_shows_where_to() {
+    let svg = figure("scenarios/classic/lens_coupled.toml --vary load.tip_force[0]=0..-5");
+    let parts = [
+        ">z of the tip<",
+        "branches cross",
+        "--switch follows the buckled",
+    ];
+    contains(&svg, &parts);
+    assert!(!svg.contains("10⁹"));
+    let ends = figure(PITCHFORK);
+    assert_eq!(ends.matches("to the end of the range").count(), 1);
+}

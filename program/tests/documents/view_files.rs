@@ -181,3 +181,16 @@ fn nothing_of_it_unasked() {
         assert!(["json", "csv", "svg", "png"].contains(&end), "{name}");
     }
 }
+
+/// The wind of a gust is on the page of its motion from when it blows: its instants have the directions of their times.
+#[test]
+fn a_page_of_a_motion_knows_the_wind_at_its_times() {
+    let place = Workplace::new();
+    let short = "--set dynamics.duration=1 --segments 8 --write html --out out/gust";
+    place.ok(format!("simulate scenarios/motion/gust.toml {short}"));
+    let page = data(&place.read("out/gust/motion.html"));
+    let blows = |leaf: &serde_json::Value| leaf["directions"].to_string().contains("wind");
+    let leaves = page["leaves"].list();
+    assert!(!page["directions"].to_string().contains("wind"));
+    assert!(!blows(&leaves[0]) && leaves.iter().any(blows));
+}

@@ -258,7 +258,10 @@ fn options_that_help_are_told() {
     let place = Workplace::new();
     let column =
         "trace scenarios/classic/elastica_buckled.toml --vary load.tip_force[0]=-1..-60 --out c";
-    let [crossings, losses] = ["--switch follows them", "--until unstable ends branches"];
+    let [crossings, losses] = [
+        "--switch follows the buckled ones",
+        "--until unstable ends branches",
+    ];
     let run = place
         .run(column)
         .ends(0)

@@ -115,7 +115,8 @@ class Equilibria(Viewed, Sequence[Equilibrium]):
             energy = "not known" if leaf.energy is None else f"{leaf.energy:.5g}"
             leaf.plot(ax, **{"color": f"C{number % 10}", "label": f"{energy}, {stable}", **kind, **style})
         if len(self):
-            ax.legend(title=energies)
+            # Beside the leaves, not over them.
+            ax.legend(title=energies, loc="center left", bbox_to_anchor=(1.05, 0.5))
         return ax
 
     def __repr__(self) -> str:

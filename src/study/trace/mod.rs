@@ -12,7 +12,7 @@ use crate::branch::{
     ExtrapolatedPoint, LeafFamily, NestedBranchEquations, ParameterRange, VerifiedBranch,
     begin_branch, switch_branches,
 };
-use crate::leaf::Grid;
+use crate::leaf::{Grid, NodalField, displacement_part};
 use crate::memory;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax,
@@ -551,7 +551,10 @@ impl BranchTracer<'_, '_> {
                     CriticalKind::Branching => PointKind::Branching(point.modes.len()),
                 };
                 let number = points.len() + 1;
-                points.push(self.trace_point(number, kind, point.indices[1], refined));
+                points.push(TracePoint {
+                    critical_mode_axis: point.modes.first().map(axis_of_largest_displacement),
+                    ..self.trace_point(number, kind, point.indices[1], refined)
+                });
             }
         }
         TraceBranch {
@@ -618,6 +621,7 @@ impl BranchTracer<'_, '_> {
             error: Some(refined.position_error * scale.length),
             energy: refined.energy * scale.moment(),
             index,
+            critical_mode_axis: None,
             motion: None,
             undulation: self.undulation_at(refined).unwrap_or_default(),
             stations: refined.grid.sigma().to_vec(),
@@ -648,6 +652,23 @@ fn is_same_point(a: &ExtrapolatedPoint, b: &ExtrapolatedPoint) -> bool {
 
 fn serialize_axis<S: Serializer>(axis: &usize, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_char(['x', 'y', 'z'][*axis])
+}
+
+/// The axis along which a mode displaces the nodes most, by the sum of squares.
+fn axis_of_largest_displacement(mode: &NodalField) -> usize {
+    let squares = mode
+        .iter()
+        .flatten()
+        .map(displacement_part)
+        .map(|by| by * by);
+    let DVec3 { x, y, z } = squares.sum();
+    if z >= x.max(y) {
+        2
+    } else if y >= x {
+        1
+    } else {
+        0
+    }
 }
 
 #[cfg(test)]

@@ -118,6 +118,9 @@ pub struct TracePoint {
     /// Morse index, or, where loads have no potential, the number of roots of the linearised motion with
     /// growth, both of a conjugate pair; at a critical point the one after it.
     pub index: usize,
+    /// The axis, 0 to 2, along which the leaf moves most in the mode that is neutral here: at critical
+    /// points of leaves with a potential.
+    pub critical_mode_axis: Option<usize>,
     /// Its small motions, where loads have no potential.
     pub motion: Option<PointMotion>,
     /// Waves and twist of the veins.

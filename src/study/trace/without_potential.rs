@@ -226,6 +226,7 @@ fn trace_point(
         error: leaf.accuracy.error_estimate,
         energy: leaf.energy.unwrap_or(f64::NAN),
         index: unstable_roots.unwrap_or(before),
+        critical_mode_axis: None,
         motion: Some(PointMotion {
             unstable_roots,
             dominant,

@@ -7,10 +7,10 @@ use crate::figure::drawing::{
     Color, Drawing, FONT_SIZE, NOTE_COLOR, PageRectangle, SECOND_SOLUTION_COLOR, Stroke,
     TEXT_COLOR, TextAnchor, WHITE, circle_path, polygon_path, polyline_path, rectangle_path,
 };
-use crate::figure::scenario::{LoadKind, LoadMark, SupportForm, load_marks};
+use crate::figure::scenario::{LoadKind, LoadMark, SupportForm};
 use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
-use leafdyn::scenario::Scenario;
+use leafdyn::scenario::Units;
 use std::f64::consts::PI;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,11 +54,22 @@ fn draw_cross(page: &mut Drawing, at: DVec2, half: f64, stroke: Stroke) {
     }
 }
 
+/// Half the side of the square that marks a clamp, and its white rim, in pixels.
+const CLAMP_HALF: f64 = 4.2;
+const CLAMP_RIM: f64 = 1.0;
+
 /// Marks where the rods are clamped; larger than the tip's marker, which may cover it.
 fn draw_clamp_marker(page: &mut Drawing, at: DVec2) {
-    let half = DVec2::splat(4.2);
-    let rim = Some(Stroke::new(WHITE, 1.0));
+    let half = DVec2::splat(CLAMP_HALF);
+    let rim = Some(Stroke::new(WHITE, CLAMP_RIM));
     page.draw_shape(rectangle_path(at - half, 2.0 * half), TEXT_COLOR, rim);
+}
+
+/// Marks the clamp of several bases, which are points of one line or of several: a bar without gaps.
+pub fn draw_clamp_bar(page: &mut Drawing, bases: &[DVec2]) {
+    bases.iter().for_each(|&at| draw_clamp_marker(page, at));
+    let width = 2.0 * CLAMP_HALF - CLAMP_RIM;
+    page.draw_stroke(polyline_path(bases), Stroke::new(TEXT_COLOR, width));
 }
 
 /// Marks the joint tip, or the tip of a single rod.
@@ -161,33 +172,33 @@ const FORCE_ARROW: ForceArrowSizes = ForceArrowSizes {
     end_on: 6.0,
 };
 
-/// The arrow of a force on a rod.
+/// The arrow of a force on a vein.
 pub struct ForceArrow {
     /// From its tail to its head.
     pub ends: [DVec3; 2],
     head: [f64; 2],
-    /// Empty of those along the rod.
+    /// Empty of those along the vein.
     label: String,
 }
 
-/// A point of a rod, with the unit tangent there.
+/// A point of a vein, with the unit tangent there.
 pub struct RodPoint {
     pub position: DVec3,
     pub tangent: DVec3,
 }
 
-/// The forces on a single rod whose largest extent is `extent`; `at` gives the point at a fraction of
-/// its length.
+/// The forces on a leaf whose largest extent is `extent`, of those that load it; `at` gives the point at a
+/// fraction of the length of a vein.
 pub fn force_arrows(
-    scenario: &Scenario,
+    marks: &[LoadMark],
+    units: &Units,
     extent: f64,
-    at: impl Fn(f64) -> Option<RodPoint>,
+    at: impl Fn(usize, f64) -> Option<RodPoint>,
 ) -> Vec<ForceArrow> {
-    let unit = scenario.units.force.as_deref();
+    let unit = units.force.as_deref();
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
-    let marks = load_marks(scenario, None).into_iter();
-    let arrow = |mark: LoadMark| {
-        let RodPoint { position, tangent } = at(mark.at)?;
+    let arrow = |mark: &LoadMark| {
+        let RodPoint { position, tangent } = at(mark.vein, mark.at)?;
         let along = mark.action == LoadKind::Distributed;
         // One that pushes against the rod ends at the point, any other begins there.
         let pushes = mark.direction.dot(tangent) < -0.5;
@@ -206,13 +217,19 @@ pub fn force_arrows(
             },
         })
     };
-    let forces = marks.filter(|mark| mark.action != LoadKind::Moment);
+    let kinds = [LoadKind::Force, LoadKind::Distributed];
+    let forces = marks.iter().filter(|mark| kinds.contains(&mark.action));
     forces.filter_map(arrow).collect()
 }
 
 impl ForceArrow {
-    /// Draws it; its label stays inside the panel.
-    pub fn draw(&self, page: &mut Drawing, cell: PageRectangle, place: impl Fn(DVec3) -> DVec2) {
+    /// What it says of its force; empty of those along a vein.
+    pub fn label(&self) -> &str {
+        &self.label
+    }
+
+    /// Draws it without its label.
+    pub fn draw(&self, page: &mut Drawing, place: impl Fn(DVec3) -> DVec2) {
         let [tail, tip] = self.ends.map(place);
         let [length, half] = self.head;
         let along = (tip - tail).normalize_or_zero();
@@ -225,6 +242,17 @@ impl ForceArrow {
                 None,
             );
         }
+    }
+
+    /// Draws its label, which stays inside the panel.
+    pub fn draw_label(
+        &self,
+        page: &mut Drawing,
+        cell: PageRectangle,
+        place: impl Fn(DVec3) -> DVec2,
+    ) {
+        let [tail, tip] = self.ends.map(place);
+        let along = (tip - tail).normalize_or_zero();
         // Beside the middle of the arrow, or below it where it lies flat.
         let size = DVec2::new(
             Font::embedded().text_width(&self.label, FONT_SIZE.tick),
@@ -270,22 +298,29 @@ const MOMENT_ARC: MomentArc = MomentArc {
     head: [8.0, 3.4],
 };
 
-/// A dead moment on a rod.
+/// A dead moment, or one per length.
 pub struct MomentArrow {
     pub position: DVec3,
     /// Unit vector about which the moment turns.
     pub axis: DVec3,
     pub size: f64,
+    pub is_per_length: bool,
 }
 
-/// The moments on a leaf, of those that load it; `at` gives the point at a fraction of its only rod.
-pub fn moment_arrows(marks: &[LoadMark], at: impl Fn(f64) -> Option<DVec3>) -> Vec<MomentArrow> {
-    let moments = marks.iter().filter(|mark| mark.action == LoadKind::Moment);
+/// The moments on a leaf, of those that load it; `at` gives the point at a fraction of the length of a
+/// vein.
+pub fn moment_arrows(
+    marks: &[LoadMark],
+    at: impl Fn(usize, f64) -> Option<DVec3>,
+) -> Vec<MomentArrow> {
+    let kinds = [LoadKind::Moment, LoadKind::Couple];
+    let moments = marks.iter().filter(|mark| kinds.contains(&mark.action));
     let moment = |mark: &LoadMark| {
         Some(MomentArrow {
             axis: mark.direction,
             size: mark.size,
-            position: at(mark.at)?,
+            is_per_length: mark.action == LoadKind::Couple,
+            position: at(mark.vein, mark.at)?,
         })
     };
     moments.filter_map(moment).collect()

@@ -5,7 +5,7 @@ pub(super) mod axes;
 pub(crate) mod formats;
 pub(super) mod labels;
 pub(super) mod markers;
-pub(super) mod space;
+pub(crate) mod space;
 pub(crate) mod veins;
 
 use glam::{DVec2, DVec3};

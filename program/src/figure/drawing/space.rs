@@ -17,23 +17,79 @@ use crate::report::numbers::format_four_digits;
 use glam::{DVec2, DVec3};
 
 /// The direction from which a box is seen, in degrees: from the xi axis, and above the floor.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ViewAngles {
     azimuth: f64,
     elevation: f64,
 }
 
-/// From above one of the edges of the box.
-pub const OBLIQUE_VIEW: ViewAngles = ViewAngles {
-    azimuth: -55.0,
-    elevation: 28.0,
+/// From the side, and a little from the end at large xi.
+const VIEW_FROM_TIP: ViewAngles = ViewAngles {
+    azimuth: -59.0,
+    elevation: 19.0,
 };
+
+/// From the side, and a little from the end at small xi.
+const VIEW_FROM_BASE: ViewAngles = ViewAngles {
+    azimuth: -121.0,
+    elevation: 19.0,
+};
+
+/// A tip that is higher or lower than its base by a smaller part of their distance is level with it.
+const LEVEL_TIP: f64 = 0.02;
+
+impl ViewAngles {
+    /// The oblique view of leaves with these vectors from the base to the tip: hanging tips are drawn
+    /// below their bases, and rising ones above.
+    ///
+    /// A view from above shows what is nearer to the viewer lower on the page: seen from its tip, a leaf
+    /// that rises a little seems to hang, and seen from its base, one that hangs a little seems to rise.
+    pub fn oblique(tips_from_bases: impl IntoIterator<Item = DVec3>) -> ViewAngles {
+        let tip: DVec3 = tips_from_bases.into_iter().sum();
+        let shown = ParallelProjection::from_view(VIEW_FROM_TIP).up.dot(tip);
+        match tip.z.abs() > LEVEL_TIP * tip.length() && shown * tip.z < 0.0 {
+            true => VIEW_FROM_BASE,
+            false => VIEW_FROM_TIP,
+        }
+    }
+
+    /// The oblique view, or that from the front if it shows these shapes farther apart: compared are the
+    /// two shapes that look most alike, in parts of what is drawn.
+    pub fn telling_apart(shapes: &[DrawnVeins]) -> ViewAngles {
+        let oblique = ViewAngles::oblique(shapes.iter().map(DrawnVeins::tip_from_base));
+        let bounds = common_bounding_box(shapes.iter());
+        let points: Vec<Vec<DVec3>> = shapes.iter().map(compared_points).collect();
+        let pairs = || (0..points.len()).flat_map(|i| (0..i).map(move |j| [i, j]));
+        let least_distance = |view: ViewAngles| {
+            let camera = ParallelProjection::from_view(view);
+            let seen = |[i, j]: [usize; 2]| {
+                let pairs = points[i].iter().zip(&points[j]);
+                let distances = pairs.map(|(a, b)| camera.project_direction(*a - *b).length());
+                distances.fold(0.0, f64::max)
+            };
+            let drawn = camera.projected_extent(bounds).max_element();
+            pairs().map(seen).fold(f64::INFINITY, f64::min) / drawn
+        };
+        match least_distance(FRONT_VIEW) > least_distance(oblique) {
+            true => FRONT_VIEW,
+            false => oblique,
+        }
+    }
+
+    /// The unit vector toward the viewer.
+    pub fn toward_viewer(self) -> DVec3 {
+        ParallelProjection::from_view(self).toward
+    }
+}
 
 /// Along the xi axis, from a little above.
 pub const FRONT_VIEW: ViewAngles = ViewAngles {
     azimuth: -8.0,
-    elevation: 12.0,
+    elevation: 6.0,
 };
+
+/// Equal parts of each vein at whose ends shapes are compared.
+const COMPARED_PARTS_PER_VEIN: usize = 8;
 
 /// No side of the box is shorter than this fraction of the longest.
 const SHORTEST_BOX_SIDE: f64 = 0.4;
@@ -58,8 +114,10 @@ impl BoxMargins {
 
 /// Distances of ticks and names along the edges of a box in space, in pixels.
 struct EdgeLabels {
-    /// Least distance between the ticks of an axis.
+    /// Least distance between the ticks of an axis that rises on the page, and of one that is rather level,
+    /// along which labels stand beside each other.
     ticks: f64,
+    level_ticks: f64,
     /// From a name to the right edge of the page, at least.
     page_edge: f64,
     /// From the edge to the name of its axis, at least, besides half of the widest label.
@@ -72,6 +130,7 @@ struct EdgeLabels {
 
 const EDGE_LABELS: EdgeLabels = EdgeLabels {
     ticks: 30.0,
+    level_ticks: 46.0,
     page_edge: 6.0,
     name: 25.0,
     small_panel_name: 14.0,
@@ -174,6 +233,28 @@ fn box_corners(bounds: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
     (0..8).map(move |k| DVec3::new(side(k, 0), side(k, 1), side(k, 2)))
 }
 
+/// Points at equal parts of every vein.
+fn compared_points(shape: &DrawnVeins) -> Vec<DVec3> {
+    let of_vein = |vein: &DrawnVein| {
+        let count = vein.pieces.len();
+        let end = |k: usize| {
+            vein.pieces
+                .get((k * count / COMPARED_PARTS_PER_VEIN).max(1) - 1)
+        };
+        let ends = (1..=COMPARED_PARTS_PER_VEIN).filter_map(|k| Some(end(k)?[3]));
+        ends.collect::<Vec<DVec3>>()
+    };
+    shape.veins.iter().flat_map(of_vein).collect()
+}
+
+/// The ends of a box along xi: that nearer to the viewer, and the other.
+fn near_and_far_x(camera: &ParallelProjection, low: DVec3, high: DVec3) -> [f64; 2] {
+    match camera.toward.x < 0.0 {
+        true => [low.x, high.x],
+        false => [high.x, low.x],
+    }
+}
+
 /// An axis along an edge of the box.
 struct AxisEdge {
     axis: usize,
@@ -223,9 +304,12 @@ impl<'s> SpacePanel<'s> {
         let edge = |axis: usize, from: DVec3, outward: DVec3, walls: [DVec3; 2]| {
             let at = |value: f64| from + (value - from[axis]) * DVec3::AXES[axis];
             let step = step.unwrap_or_else(|| {
-                round_step(
-                    unit * EDGE_LABELS.ticks / camera.project_direction(DVec3::AXES[axis]).length(),
-                )
+                let way = camera.project_direction(DVec3::AXES[axis]);
+                let apart = match way.x.abs() > way.y.abs() {
+                    true => EDGE_LABELS.level_ticks,
+                    false => EDGE_LABELS.ticks,
+                };
+                round_step(unit * apart / way.length())
             });
             let inset = 0.02 * (high - low)[axis];
             let ends = [low[axis] + inset, high[axis] - inset].map(|end| unit * end);
@@ -245,10 +329,21 @@ impl<'s> SpacePanel<'s> {
             }
         };
         let [x, y, z] = DVec3::AXES.map(|axis| (high - low) * axis);
+        let [near_x, far_x] = near_and_far_x(&camera, low, high);
+        // From the near side to the far one.
+        let inward = x * (far_x - near_x).signum();
         let edges = [
             edge(0, low, DVec3::NEG_Y, [y, y + z]),
-            edge(1, low.with_x(high.x), DVec3::X, [-x, z - x]),
-            edge(2, low, -camera.right, [y, y + x]),
+            edge(
+                1,
+                low.with_x(near_x),
+                -inward.normalize_or_zero(),
+                [inward, z + inward],
+            ),
+            match near_x > far_x {
+                true => edge(2, low, -camera.right, [y, y + x]),
+                false => edge(2, low.with_y(high.y), -camera.right, [x, x - y]),
+            },
         ];
         SpacePanel {
             low,
@@ -267,12 +362,13 @@ impl<'s> SpacePanel<'s> {
     /// Draws the floor, the two walls behind the leaf, and their grid.
     pub fn draw_floor_and_walls(&self, page: &mut Drawing) {
         let (low, high) = (self.low, self.high);
-        // Seen from large xi and small eta, the walls at small xi and large eta are
-        // behind the leaf.
-        let near = DVec3::new(high.x, low.y, low.z);
-        let far = DVec3::new(low.x, high.y, low.z);
-        let right = near.with_y(high.y);
-        let floor = [low, near, right, far].map(|corner| self.project_point(corner));
+        // Seen from small eta, the wall at large eta is behind the leaf, and so is that at the far xi.
+        let [near_x, far_x] = near_and_far_x(&self.camera, low, high);
+        let near = low.with_x(near_x);
+        let side = low.with_x(far_x);
+        let behind = near.with_y(high.y);
+        let far = side.with_y(high.y);
+        let floor = [side, near, behind, far].map(|corner| self.project_point(corner));
         page.draw_shape(polygon_path(&floor), FLOOR_COLOR, None);
         for edge in &self.edges {
             for &EdgeTick { point: start, .. } in &edge.ticks {
@@ -287,15 +383,15 @@ impl<'s> SpacePanel<'s> {
         }
         let top = |corner: DVec3| corner.with_z(high.z);
         for (from, to) in [
-            (low, near),
-            (near, right),
-            (low, top(low)),
-            (far, right),
-            (far, low),
+            (side, near),
+            (near, behind),
+            (side, top(side)),
+            (far, behind),
+            (far, side),
             (far, top(far)),
-            (top(low), top(far)),
-            (top(far), high),
-            (right, high),
+            (top(side), top(far)),
+            (top(far), top(behind)),
+            (behind, top(behind)),
         ] {
             page.draw_line(
                 self.project_point(from),
@@ -349,8 +445,8 @@ impl<'s> SpacePanel<'s> {
                 page.width - Font::embedded().text_width(&name, size) - EDGE_LABELS.page_edge;
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, TextAnchor::Middle),
-                0 => (at, TextAnchor::End),
-                1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
+                0 | 1 if edge.outward.x < 0.0 => (at, TextAnchor::End),
+                0 | 1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
                 _ => (
                     self.project_point(edge.to) + EDGE_LABELS.vertical_name,
                     TextAnchor::End,
@@ -495,6 +591,8 @@ pub const SMALL_LINE_WIDTH_FACTOR: f64 = 0.75;
 /// Where the panels are, and the box that all of them show.
 pub struct SmallPanels<'s> {
     bounds: [DVec3; 2],
+    /// From where all of them are seen.
+    pub view: ViewAngles,
     setting: &'s FigureSetting,
     /// Displayed width of a square of the grid.
     grid_step: f64,
@@ -504,8 +602,20 @@ pub struct SmallPanels<'s> {
 }
 
 impl<'s> SmallPanels<'s> {
-    /// `count` panels from `top` on that can hold any of these shapes.
+    /// `count` panels from `top` on that can hold any of these shapes, in the oblique view of all.
     pub fn fitted_to_shapes<'a>(
+        shapes: impl Iterator<Item = &'a DrawnVeins> + Clone,
+        count: usize,
+        setting: &'s FigureSetting,
+        top: f64,
+    ) -> Self {
+        let view = ViewAngles::oblique(shapes.clone().map(DrawnVeins::tip_from_base));
+        SmallPanels::seen_from(view, shapes, count, setting, top)
+    }
+
+    /// `count` panels from `top` on that can hold any of these shapes in this view.
+    pub fn seen_from<'a>(
+        view: ViewAngles,
         shapes: impl Iterator<Item = &'a DrawnVeins>,
         count: usize,
         setting: &'s FigureSetting,
@@ -516,7 +626,7 @@ impl<'s> SmallPanels<'s> {
             - 2.0 * PAGE.side_margin
             - (SMALL_PANEL.columns - 1) as f64 * SMALL_PANEL.gap)
             / SMALL_PANEL.columns as f64;
-        let extent = ParallelProjection::from_view(OBLIQUE_VIEW).projected_extent(bounds);
+        let extent = ParallelProjection::from_view(view).projected_extent(bounds);
         let height = (width - SMALL_PANEL.margins.left - SMALL_PANEL.margins.right) * extent.y
             / extent.x
             + SMALL_PANEL.margins.below;
@@ -524,6 +634,7 @@ impl<'s> SmallPanels<'s> {
         let scale = (SMALL_PANEL.margins.inner_size(size) / extent).min_element();
         SmallPanels {
             bounds,
+            view,
             grid_step: round_step(setting.value_per_length() * SMALL_PANEL.grid_spacing / scale),
             setting,
             size,
@@ -573,7 +684,7 @@ impl<'s> SmallPanels<'s> {
             text,
             color: NOTE_COLOR,
         };
-        let scene = self.draw_empty_panel(page, index, 0.0, OBLIQUE_VIEW, caption);
+        let scene = self.draw_empty_panel(page, index, 0.0, self.view, caption);
         scene.draw_leaf(page, veins, SMALL_LINE_WIDTH_FACTOR * veins.line_width());
     }
 
@@ -598,5 +709,89 @@ impl<'s> SmallPanels<'s> {
         }
         scene.draw_direction_arrows(page, index == 0, time);
         scene
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::sample;
+
+    #[test]
+    fn tips_below_their_bases_are_drawn_below_them_and_higher_ones_above() {
+        let heights = [-2.0, -0.5, -0.15, -0.03, 0.03, 0.15, 0.5, 2.0];
+        for (x, y) in [
+            (1.0, 0.0),
+            (1.0, 0.05),
+            (0.9, -0.1),
+            (-0.5, 0.0),
+            (0.0, 0.1),
+        ] {
+            for z in heights {
+                let tip = DVec3::new(x, y, z);
+                let camera = ParallelProjection::from_view(ViewAngles::oblique([tip]));
+                let below = camera.project_point(tip).y - camera.project_point(DVec3::ZERO).y;
+                assert!(below * z < 0.0, "{tip} is drawn {below} below its base");
+            }
+        }
+        // What is level, or not a number, has the usual view.
+        for tip in [
+            DVec3::X,
+            DVec3::new(1.0, 0.0, 1e-9),
+            DVec3::NAN,
+            DVec3::ZERO,
+        ] {
+            assert_eq!(ViewAngles::oblique([tip]), VIEW_FROM_TIP);
+        }
+    }
+
+    #[test]
+    fn shapes_that_differ_across_are_seen_from_the_front() {
+        let shape = |[y, z]: [f64; 2]| {
+            let curve: Vec<DVec3> = (0..=8)
+                .map(|k| DVec3::new(f64::from(k) / 8.0, 0.0, 0.0))
+                .chain([DVec3::new(1.1, y, z)])
+                .collect();
+            DrawnVeins::from_curves(std::slice::from_ref(&curve), &curve[9..], 1.0)
+        };
+        let across = [[0.1, 0.0], [-0.1, 0.0], [0.0, 0.1]].map(shape);
+        assert_eq!(ViewAngles::telling_apart(&across), FRONT_VIEW);
+        // A single shape has nothing from which it is to be told apart.
+        let one = ViewAngles::telling_apart(&across[..1]);
+        assert_eq!(one, VIEW_FROM_TIP);
+    }
+
+    #[test]
+    fn walls_are_behind_the_leaf_and_its_axes_before_it() {
+        let setting = FigureSetting::from_scenario(&sample::sample_scenario("fan", 3));
+        let cell = PageRectangle::new(DVec2::ZERO, DVec2::splat(400.0));
+        for view in [VIEW_FROM_TIP, VIEW_FROM_BASE, FRONT_VIEW] {
+            let bounds = [DVec3::ZERO, DVec3::ONE];
+            let margins = SMALL_PANEL.margins;
+            let scene = SpacePanel::new(bounds, &setting, view, cell, margins, None);
+            let toward = scene.camera.toward;
+            let middle = toward.dot(DVec3::splat(0.5));
+            let [xi, eta, zeta] = &scene.edges;
+            for edge in [xi, eta] {
+                assert!(toward.dot(0.5 * (edge.from + edge.to)) > middle, "{view:?}");
+            }
+            let left = scene.project_point(zeta.from).x;
+            let corners = box_corners(bounds).map(|corner| scene.project_point(corner).x);
+            assert!(
+                (left - corners.fold(f64::INFINITY, f64::min)).abs() < 1e-9,
+                "{view:?}"
+            );
+            // Grid lines end on a wall: at the far xi or at large eta.
+            for edge in &scene.edges {
+                let end = edge.from + edge.grid_line_offsets[1];
+                let inside = end.cmpge(DVec3::splat(-1e-9)) & end.cmple(DVec3::splat(1.0 + 1e-9));
+                let corner = edge.axis != 2 || toward.dot(end) < toward.dot(zeta.from);
+                assert!(
+                    inside.all() && corner || edge.axis == 2,
+                    "{view:?} {}",
+                    edge.axis
+                );
+            }
+        }
     }
 }

@@ -1,9 +1,10 @@
 //! The veins of a leaf as they are drawn, in units of the longest rod: smooth curves with their
-//! supports, grips, moments and markers, of a leaf at rest, in motion, or of any curves.
+//! supports, grips, loads and markers, of a leaf at rest, in motion, or of any curves.
 
+use crate::figure::drawing::axes::round_step;
 use crate::figure::drawing::markers::{
-    Marker, MomentArrow, draw_second_solution_dot, draw_support_marker, draw_tip_marker,
-    moment_arrows,
+    ForceArrow, Marker, MomentArrow, RodPoint, draw_clamp_bar, draw_second_solution_dot,
+    draw_support_marker, draw_tip_marker, force_arrows, moment_arrows,
 };
 use crate::figure::drawing::{
     Color, Drawing, DrawingPath, PathStep, Stroke, TEXT_COLOR, WHITE, circle_path, color_of_vein,
@@ -46,6 +47,9 @@ const SECOND_SOLUTION_DOT_LIMITS: DotLimits = DotLimits {
     fewest: 8,
 };
 
+/// Part of a vein over which its tangent at a force is taken.
+const TANGENT_REACH: f64 = 0.02;
+
 pub type BezierPiece = [DVec3; 4];
 
 pub struct DrawnVein {
@@ -86,6 +90,7 @@ pub struct DrawnVeins {
     pub base_support: SupportForm,
     pub tip_support: Option<SupportForm>,
     pub grips: Vec<GrippedStretch>,
+    pub forces: Vec<ForceArrow>,
     pub moments: Vec<MomentArrow>,
     /// Corners of the bounding box.
     pub low: DVec3,
@@ -123,6 +128,16 @@ impl DrawnVeins {
         self.veins.iter().map(first)
     }
 
+    /// From the base to the tip, or from the mean of all bases to that of all tips.
+    pub fn tip_from_base(&self) -> DVec3 {
+        let mean = |points: &mut dyn Iterator<Item = DVec3>| {
+            let points: Vec<DVec3> = points.collect();
+            points.iter().sum::<DVec3>() / points.len().max(1) as f64
+        };
+        let tips = self.tips.iter().map(|tip| tip.position);
+        mean(&mut { tips }) - mean(&mut self.bases())
+    }
+
     /// The veins of a moving leaf at one instant.
     pub fn from_motion(record: &Record, still: &ShapeSnapshot, scenario: &Scenario) -> Self {
         let tips = vein_tips(&still.curves, record.joined);
@@ -134,8 +149,8 @@ impl DrawnVeins {
             .with_loads(scenario, &loads, &record.stations, &still.curves)
     }
 
-    /// Adds what the grips of a scenario hold and where moments act, on curves through nodes at these
-    /// stations.
+    /// Adds what the grips of a scenario hold and where forces and moments act, on curves through nodes
+    /// at these stations.
     fn with_loads(
         mut self,
         scenario: &Scenario,
@@ -143,11 +158,28 @@ impl DrawnVeins {
         stations: &[f64],
         curves: &[Vec<DVec3>],
     ) -> Self {
-        self.moments = moment_arrows(loads, |sigma| {
-            let point =
-                curve_between_fractions(stations, curves.first()?, [sigma; 2]).pop()? / self.unit;
+        let point = |vein: usize, sigma: f64| {
+            let curve = curves.get(vein - 1)?;
+            let point = curve_between_fractions(stations, curve, [sigma; 2]).pop()? / self.unit;
             is_drawable(point).then_some(point)
-        });
+        };
+        self.moments = moment_arrows(loads, point);
+        self.forces = force_arrows(
+            loads,
+            &scenario.units,
+            self.largest_extent(),
+            |vein, sigma| {
+                let near = [(sigma - TANGENT_REACH).max(0.0), sigma.max(TANGENT_REACH)];
+                let [before, there] = near.map(|sigma| point(vein, sigma));
+                Some(RodPoint {
+                    position: point(vein, sigma)?,
+                    tangent: (there? - before?).normalize_or_zero(),
+                })
+            },
+        );
+        for end in self.forces.iter().flat_map(|force| force.ends) {
+            (self.low, self.high) = (self.low.min(end), self.high.max(end));
+        }
         let grips = support_marks(scenario).into_iter();
         for grip in
             grips.filter(|mark| [ParsedKey::Grip, ParsedKey::Foundation].contains(&mark.part))
@@ -213,6 +245,7 @@ impl DrawnVeins {
             base_support: SupportForm::Clamped,
             tip_support: None,
             grips: Vec::new(),
+            forces: Vec::new(),
             moments: Vec::new(),
             low,
             high,
@@ -248,9 +281,19 @@ impl DrawnVeins {
         if every > 1 {
             notes.push(format!("1 vein in {every} drawn"));
         }
+        let single: Vec<&ForceArrow> = (self.forces.iter())
+            .filter(|force| !force.label().is_empty())
+            .collect();
+        match single.as_slice() {
+            // On a rod every arrow has its label.
+            _ if self.count == 1 => (),
+            [] => (),
+            [one] => notes.push(format!("arrow: {}", one.label())),
+            _ => notes.push("arrows: forces".into()),
+        }
         match self.moments.as_slice() {
             [] => (),
-            [one] => notes.push(format!(
+            [one] if !one.is_per_length => notes.push(format!(
                 "curved arrow: moment {}",
                 setting.moment_text(one.size)
             )),
@@ -305,6 +348,25 @@ pub fn longest_curve<'c>(curves: impl IntoIterator<Item = &'c Vec<DVec3>>) -> f6
     curves.into_iter().map(length).fold(0.0, f64::max)
 }
 
+/// Displacements of a buckled leaf below this fraction of its length are magnified.
+const LEAST_VISIBLE_DISPLACEMENT: f64 = 0.1;
+
+/// Magnifies the displacements of curves from others with as many nodes until they are visible; returns
+/// the factor, if there is one.
+pub fn magnify_displacements(curves: &mut [Vec<DVec3>], from: &[Vec<DVec3>]) -> Option<f64> {
+    let largest = curves.iter().flatten().zip(from.iter().flatten());
+    let largest = largest.map(|(x, y)| x.distance(*y)).fold(0.0, f64::max);
+    let visible = LEAST_VISIBLE_DISPLACEMENT * longest_curve(&*curves);
+    if !(0.0 < largest && largest < visible) {
+        return None;
+    }
+    let factor = round_step(visible / largest);
+    for (x, from) in curves.iter_mut().flatten().zip(from.iter().flatten()) {
+        *x = *from + factor * (*x - *from);
+    }
+    Some(factor)
+}
+
 /// Points of which those that cannot be drawn repeat the one before; the first is the clamp.
 pub fn replace_undrawable_points(points: impl Iterator<Item = DVec3>, longest: f64) -> Vec<DVec3> {
     let mut last = DVec3::ZERO;
@@ -327,13 +389,22 @@ pub fn node_stride(nodes: usize, most: usize) -> usize {
 
 /// Draws the markers of a leaf: those along its veins, and of its bases and tips.
 pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
+    for force in &veins.forces {
+        force.draw(page, &place);
+    }
     draw_vein_markers(page, veins, &place);
     let mut bases: Vec<DVec3> = Vec::new();
     for base in veins.bases() {
         if !bases.contains(&base) {
-            draw_support_marker(page, place(base), veins.base_support);
             bases.push(base);
         }
+    }
+    let places: Vec<DVec2> = bases.into_iter().map(&place).collect();
+    match (veins.base_support, places.as_slice()) {
+        (SupportForm::Clamped, [_, _, ..]) => draw_clamp_bar(page, &places),
+        (held, places) => places
+            .iter()
+            .for_each(|&at| draw_support_marker(page, at, held)),
     }
     if let [tip] = veins.tips.as_slice() {
         return match veins.tip_support {
@@ -467,6 +538,24 @@ mod tests {
             for t in [0.25, 0.5, 0.75] {
                 assert!((bezier_point(piece, t).length() * PI - 1.0).abs() < 2e-3);
             }
+        }
+    }
+
+    #[test]
+    fn small_displacements_are_magnified_until_they_are_visible() {
+        let straight = vec![vec![DVec3::ZERO, DVec3::X]];
+        for (by, factor) in [
+            (1e-3, Some(100.0)),
+            (0.04, Some(2.0)),
+            (0.2, None),
+            (0.0, None),
+        ] {
+            let mut bent = straight.clone();
+            bent[0][1].y = by;
+            let found = magnify_displacements(&mut bent, &straight);
+            assert_eq!(found, factor, "{by}");
+            let drawn = by * factor.unwrap_or(1.0);
+            assert!((bent[0][1] - DVec3::new(1.0, drawn, 0.0)).length() < 1e-12);
         }
     }
 
