@@ -365,7 +365,8 @@ fn the_schema_has_tables_within_tables() {
     assert_eq!(
         names,
         [
-            "at", "factor", "follows", "force", "from", "mass", "moment", "vein", "velocity"
+            "at", "factor", "follows", "force", "from", "mass", "moment", "offset", "vein",
+            "velocity"
         ]
     );
     assert_eq!(

@@ -230,6 +230,7 @@ mod tests {
             moment: [0.3, 0.2, 0.1],
             follows: false,
             mass: 0.0,
+            offset: [0.0; 2],
             in_time: None,
             landing: None,
         }];

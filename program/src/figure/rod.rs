@@ -14,7 +14,9 @@ use crate::figure::drawing::{
     Drawing, DrawingPath, FRAME_COLOR, PAGE, PageRectangle, PathStep, Stroke, TEXT_COLOR,
     curve_between_fractions, draw_panel_title, is_drawable, polyline_path,
 };
-use crate::figure::scenario::{FigureSetting, SupportForm, with_followers_as_dead};
+use crate::figure::scenario::{
+    FigureSetting, SupportForm, section_rotation, with_followers_as_dead,
+};
 use glam::{DVec2, DVec3};
 use leafdyn::natural::Natural;
 use leafdyn::relax::Equilibrium;
@@ -185,10 +187,14 @@ impl<'a> DrawnRod<'a> {
             unloaded.truncate(count);
         }
         let loaded = with_followers_as_dead(scenario, leaf);
-        let forces = force_arrows(&loaded, veins.largest_extent(), |sigma| {
+        let forces = force_arrows(&loaded, veins.largest_extent(), |sigma, offset| {
             let [before, there] = [(sigma - 0.02).max(0.0), sigma.max(0.02)].map(&point);
+            let [along_2, along_3] = offset;
+            let own = DVec3::new(0.0, along_2, along_3) / veins.unit;
+            let arm = section_rotation(leaf, 0, sigma).map_or(DVec3::ZERO, |turn| turn * own);
             Some(RodPoint {
-                position: point(sigma)?,
+                position: point(sigma)? + arm,
+                arm,
                 tangent: (there? - before?).normalize_or_zero(),
             })
         });
@@ -384,6 +390,7 @@ mod tests {
                 moment: [0.0; 3],
                 follows: false,
                 mass: 0.0,
+                offset: [0.0; 2],
                 in_time: None,
                 landing: None,
             }];
@@ -425,6 +432,7 @@ mod tests {
                     moment: [0.0; 3],
                     follows,
                     mass: 0.0,
+                    offset: [0.0; 2],
                     in_time: None,
                     landing: None,
                 }];
@@ -433,6 +441,22 @@ mod tests {
         let drawn = loaded(own, true);
         assert!(drawn.contains(">force 0.5385<"));
         assert_eq!(drawn, loaded(turn * own, false));
+        // Off the axis it begins beside it.
+        let beside = svg(|it| {
+            it.points = vec![PointLoad {
+                vein: 0,
+                at: rod.shape.stations[4],
+                force: own.to_array(),
+                moment: [0.0; 3],
+                follows: true,
+                mass: 0.0,
+                offset: [0.0, 0.1],
+                in_time: None,
+                landing: None,
+            }];
+        });
+        assert!(beside.contains(">force 0.5385<"));
+        assert_ne!(beside, drawn);
         let along = svg(|it| {
             it.follower = Some(vec![
                 [0.0, 0.0, 0.3].map(leafdyn::scenario::Profile::Constant),
