@@ -92,7 +92,10 @@ fn on_leaves_of_every_kind() {
         let scenario = parse(&format!(
             r#"
             name = "{kind}"
-            leaf = {{ rods = 3, length = [1.0, 0.95, 1.05], fan = "symmetric" }}
+            leaf.rods = 3
+            leaf.length = [1.0, 0.95, 1.05]
+            leaf.fan = "symmetric"
+            dynamics.density = 0.3
             rest = {{ bend_2 = 0.3, twist = 0.4 }}
             stiffness = {{ torsion = 0.7, bending_2 = 1.0, bending_3 = 1.4, axial = 40.0, shear_2 = 50.0, shear_3 = 60.0 }}
             load.tip_force = [0.3, 0.1, -0.2]
@@ -102,6 +105,13 @@ fn on_leaves_of_every_kind() {
         ));
         let leaf = settle(&scenario, 1e-11);
         let shot = shot_near(&scenario, &leaf);
+        if kind == "rigid tissue" {
+            // It passes a load on a point to its neighbors at once: the forces in the veins jump there.
+            let found = apart(&scenario, &leaf.shape.rods, &shot.rods);
+            assert!(found.position < 1e-8 && found.rotation < 1e-8, "{found:?}");
+            close(kind, leaf.energy.unwrap(), shot.energy, 1e-8);
+            continue;
+        }
         agree(kind, &scenario, &leaf, &shot, 1e-8);
     }
 }
