@@ -171,6 +171,11 @@ pub fn outer(a: DVec3, b: DVec3) -> DMat3 {
     DMat3::from_cols(a * b.x, a * b.y, a * b.z)
 }
 
+/// The matrix \[a\] with \[a\] b = a x b.
+pub fn cross_matrix(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
+}
+
 /// The directors of quaternions s of any length, `scale` being 2/|s|^2.
 #[inline(always)]
 pub fn directors<S: Simd>(quaternions: Quaternions<S>, scale: Lanes<S>) -> [Vectors<S>; 3] {

@@ -49,6 +49,7 @@ impl DiscreteLeaf {
         let mut total = AssemblyTotals {
             energy: self.add_tissue(state, system, MATRIX)
                 + self.add_own_loads(state, system)
+                + self.add_levers(state, system, MATRIX)
                 + self.add_springs(state, system, MATRIX)
                 + self.base_energy(state),
             largest_turn: 0.0,
@@ -163,7 +164,7 @@ impl DiscreteLeaf {
         let tissue = self.tissue_loads(state);
         for j in 0..self.rods() {
             let on_tissue = |i: usize| tissue.get(state.base(j) + i).copied().unwrap_or_default();
-            let turned = on_tissue(0).moment
+            let turned = self.load_with_tissue(state, j, 0, on_tissue(0)).moment
                 + self.node_moment(state, j, 0)
                 + self.spring_load(state, j, 0).moment;
             let (mut force, mut moment) = (DVec3::ZERO, turned);
@@ -204,9 +205,11 @@ impl DiscreteLeaf {
     }
 
     /// Potential energy of the loads and of the coupling at the bases: none where these are in the
-    /// origin.
+    /// origin, and no force acts off their axes.
     fn base_energy(&self, state: &State) -> f64 {
-        let apart = |j: usize| state.x[state.base(j)] != DVec3::ZERO;
+        let apart = |j: usize| {
+            state.x[state.base(j)] != DVec3::ZERO || self.levers_on(j, 0).next().is_some()
+        };
         if !(0..self.rods()).any(apart) {
             return 0.0;
         }

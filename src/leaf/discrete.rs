@@ -9,6 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
+use crate::leaf::levers::Lever;
 use crate::leaf::nodal_loads::{NodalMoment, ScheduledLoads};
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
@@ -55,10 +56,12 @@ pub struct DiscreteLeaf {
     pub(super) strips: Vec<TissueStrip>,
     /// Forces on all nodes by loads of their veins alone; empty if there are none.
     pub(super) own_loads: Vec<DVec3>,
+    /// Those of these forces that act off the axis.
+    pub(super) levers: Vec<Lever>,
     /// Dead moments on points of a single rod, whole.
     pub(super) point_moments: Vec<NodalMoment>,
     /// Loads of single veins that vary in time, if there are any. Their forces and moments are in
-    /// `own_loads` and `point_moments`, which are those at rest until factors are set.
+    /// `own_loads`, `levers` and `point_moments`, which are those at rest until factors are set.
     pub scheduled_loads: Option<Box<ScheduledLoads>>,
     /// Loads without a potential on all nodes, rod after rod, before their factor; empty if there are none.
     pub(super) followers: Vec<FollowerLoad>,
@@ -142,6 +145,7 @@ impl DiscreteLeaf {
             coupling,
             strips: Vec::new(),
             own_loads: Vec::new(),
+            levers: Vec::new(),
             point_moments: Vec::new(),
             scheduled_loads: None,
             followers: Vec::new(),
@@ -151,6 +155,7 @@ impl DiscreteLeaf {
             loads: leaf.loads,
         };
         discrete.own_loads = discrete.nodal_own_loads(leaf);
+        discrete.levers = discrete.nodal_levers(leaf);
         discrete.point_moments = discrete.nodal_point_moments();
         discrete.scheduled_loads = discrete.find_scheduled_loads();
         discrete.followers = discrete.nodal_followers();
@@ -466,11 +471,16 @@ impl DiscreteLeaf {
         let weights = self.node_weights(i);
         let lanes = load.node_forces(x.map(Vectors::from), weights, i == self.segments());
         let own = self.own_load_on_node(j, i);
-        NodeLoad {
+        let mut load = NodeLoad {
             moment: tissue.moment,
             force: DVec3::from(lanes.force) + tissue.force + own,
             energy: f64::from(lanes.energy) + tissue.energy - own.dot(state.x[k]),
+        };
+        for lever in self.levers_on(j, i) {
+            load.moment += lever.moment(state.q[k]);
+            load.energy += lever.energy(state.q[k]);
         }
+        load
     }
 
     /// Potential energy of the dead loads in a state.

@@ -57,14 +57,22 @@ impl Leaf {
     fn point_followers(&self) -> impl Iterator<Item = PointFollower> {
         let (s, scale) = (self.scenario(), self.scale);
         let points = s.points.iter().filter(|it| it.follows);
-        points.map(move |it| PointFollower {
-            rod: it.vein,
-            sigma: it.at,
-            load: FollowerLoad {
-                force: DVec3::from_array(it.force) / scale.force(),
-                moment: DVec3::from_array(it.moment) / scale.moment(),
-                dead_moment: DVec3::ZERO,
-            },
+        points.map(move |it| {
+            let force = DVec3::from_array(it.force) / scale.force();
+            let moment = DVec3::from_array(it.moment) / scale.moment();
+            PointFollower {
+                rod: it.vein,
+                sigma: it.at,
+                load: FollowerLoad {
+                    force,
+                    // Of a force that turns with the section the lever does, too.
+                    moment: match it.is_off_axis() {
+                        true => moment + self.point_offset(it).cross(force),
+                        false => moment,
+                    },
+                    dead_moment: DVec3::ZERO,
+                },
+            }
         })
     }
 

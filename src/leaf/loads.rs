@@ -6,6 +6,7 @@
 
 use crate::leaf::block_tridiagonal::rod_lane;
 use crate::leaf::discrete::{DiscreteLeaf, Grid};
+use crate::leaf::levers::Lever;
 use crate::leaf::nodal_loads::{NodalMoment, ScheduledForce, ScheduledLoads};
 use crate::leaf::state::State;
 use crate::leaf::system::System;
@@ -28,6 +29,8 @@ pub struct PointForce {
     pub rod: usize,
     pub sigma: f64,
     pub force: DVec3,
+    /// Where it acts off the axis, along the directors.
+    pub offset: DVec3,
 }
 
 impl Loads {
@@ -133,6 +136,7 @@ impl DiscreteLeaf {
             factors: vec![0.0; count],
             constant_forces: self.nodal_own_loads(&constant),
             constant_moments: self.nodal_moments(constant_points).collect(),
+            constant_levers: self.nodal_levers(&constant),
             ..ScheduledLoads::default()
         };
         if let Some(loads) = &scenario.factored {
@@ -154,16 +158,14 @@ impl DiscreteLeaf {
                     force,
                 })
                 .collect();
+            let levers = self.nodal_levers(&whole).into_iter();
+            scheduled.levers = levers.map(|lever| (0, lever)).collect();
         }
         let points = scenario.points.iter();
         let varying = points.filter_map(|it| Some((it, it.in_time.as_ref()?)));
         for (factor, (point, load)) in (usize::from(is_factored)..).zip(varying) {
-            scheduled.forces.push(ScheduledForce {
-                factor,
-                rod: point.vein,
-                node: self.grid.nearest_node(point.at),
-                force: DVec3::from_array(load.force) / scale.force(),
-            });
+            let force = DVec3::from_array(load.force) / scale.force();
+            scheduled.push_force(factor, self.node_lever(point, force));
             let moment = PointMoment {
                 sigma: point.at,
                 moment: DVec3::from_array(load.moment) / scale.moment(),
@@ -174,12 +176,8 @@ impl DiscreteLeaf {
         let g = scenario.factored.as_ref().map_or(scenario.g, |it| it.g);
         for (factor, (number, landing)) in (factors..).zip(scenario.landings()) {
             let point = &scenario.points[number];
-            scheduled.forces.push(ScheduledForce {
-                factor,
-                rod: point.vein,
-                node: self.grid.nearest_node(point.at),
-                force: landing.mass * DVec3::from_array(g) / scale.force(),
-            });
+            let weight = landing.mass * DVec3::from_array(g) / scale.force();
+            scheduled.push_force(factor, self.node_lever(point, weight));
         }
         Some(Box::new(scheduled))
     }
@@ -197,6 +195,12 @@ impl DiscreteLeaf {
         for it in &scheduled.forces {
             self.own_loads[it.rod * count + it.node] += scheduled.factors[it.factor] * it.force;
         }
+        self.levers.clone_from(&scheduled.constant_levers);
+        let levers = scheduled.levers.iter();
+        self.levers.extend(levers.map(|(number, it)| Lever {
+            force: scheduled.factors[*number] * it.force,
+            ..*it
+        }));
         self.point_moments.clone_from(&scheduled.constant_moments);
         let moments = scheduled.moments.iter();
         self.point_moments
@@ -328,6 +332,7 @@ impl Leaf {
             rod: it.vein,
             sigma: it.at,
             force: DVec3::from_array(s.force_on(it)) / unit,
+            offset: self.point_offset(it),
         })
     }
 }
@@ -366,7 +371,10 @@ impl DiscreteLeaf {
         let n = self.segments();
         let node = |(j, i)| self.grid.own_load_around_node(leaf, j, i);
         let mut loads: Vec<DVec3> = self.rod_index_pairs(0..n + 1).map(node).collect();
-        for PointForce { rod, sigma, force } in leaf.point_forces() {
+        for PointForce {
+            rod, sigma, force, ..
+        } in leaf.point_forces()
+        {
             loads[rod * (n + 1) + self.grid.nearest_node(sigma)] += force;
         }
         loads

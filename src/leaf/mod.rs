@@ -15,6 +15,7 @@ mod discrete;
 mod elastic_supports;
 mod followers;
 mod law;
+mod levers;
 mod loads;
 mod mirror;
 mod nodal_loads;
@@ -36,6 +37,7 @@ pub use crate::leaf::derivative::parameter::{
 pub use crate::leaf::direct::pattern::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
 pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodeLoad};
+pub use crate::leaf::levers::Lever;
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,

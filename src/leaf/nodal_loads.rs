@@ -1,5 +1,6 @@
 //! Loads on single nodes: dead moments, loads whose factors vary in time, and loads that turn with the section.
 
+use crate::leaf::levers::Lever;
 use crate::rod::Wrench;
 use glam::{DQuat, DVec3};
 use std::ops::{Add, Mul};
@@ -33,12 +34,29 @@ pub struct ScheduledLoads {
     pub forces: Vec<ScheduledForce>,
     /// Dead moments on points, at factors of one, each with the number of its factor.
     pub moments: Vec<(usize, NodalMoment)>,
+    /// The forces that act off the axis, also in `forces`, at factors of one, each with the number of its factor.
+    pub levers: Vec<(usize, Lever)>,
     /// Forces on all nodes, and dead moments on points, whose factors do not vary.
     pub constant_forces: Vec<DVec3>,
     pub constant_moments: Vec<NodalMoment>,
+    /// The constant forces that act off the axis, also in `constant_forces`.
+    pub constant_levers: Vec<Lever>,
 }
 
 impl ScheduledLoads {
+    /// Adds a force that acts on the axis or off it.
+    pub fn push_force(&mut self, factor: usize, lever: Lever) {
+        self.forces.push(ScheduledForce {
+            factor,
+            rod: lever.rod,
+            node: lever.node,
+            force: lever.force,
+        });
+        if lever.offset != DVec3::ZERO {
+            self.levers.push((factor, lever));
+        }
+    }
+
     /// The forces with their present factors.
     pub fn present_forces(&self) -> impl Iterator<Item = ScheduledForce> {
         self.forces.iter().map(|it| ScheduledForce {

@@ -301,7 +301,10 @@ impl<'a> RodIntegrator<'a> {
             let q = unpack_rod_fields(&self.fields, j).q.normalize();
             let follower = self.leaf.point_follower_at(j, sigma).wrench(q);
             let force = sign * (self.leaf.point_force_at(j, sigma) + follower.force);
-            let moment = sign * (self.leaf.dead_moment_at(sigma) + follower.moment);
+            let mut moment = sign * (self.leaf.dead_moment_at(sigma) + follower.moment);
+            if self.leaf.has_levers() {
+                moment += sign * self.leaf.lever_moment_at(j, sigma, q);
+            }
             let RodLane { group, lane } = rod_lane(j);
             let fields = &mut self.fields[group];
             for c in 0..3 {

@@ -567,6 +567,17 @@ impl System {
         self.add_to_node(j, i, against_rotation, Wrench::default());
     }
 
+    /// Adds to the matrix, at node `i` of rod `j`, what couples its rotation (rows) and its displacement.
+    pub fn add_rotation_displacement_coupling(&mut self, j: usize, i: usize, coupling: DMat3) {
+        let RodLane { group, lane } = rod_lane(j);
+        let (at, chain) = (i - self.first, &mut self.groups[group].matrix);
+        for c in 0..3 {
+            for r in 0..3 {
+                chain.diagonal_entry_mut(at, r, 3 + c).0[lane] += coupling.col(c)[r];
+            }
+        }
+    }
+
     /// Adds `stiffness` to the matrix between the displacements of nodes `i` and `i` + 1 of
     /// rod `j`.
     pub fn add_adjacent_node_spring(&mut self, j: usize, i: usize, stiffness: DMat3) {

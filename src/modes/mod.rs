@@ -498,6 +498,8 @@ struct NodeMassBlock {
     tensor: DMat3,
     /// Along the lab axes.
     mass: DVec3,
+    /// Between rotation (rows) and displacement, of masses off the axis.
+    coupling: Option<DMat3>,
 }
 
 /// The mass matrix of a leaf, its unknowns numbered as in the pattern of its
@@ -525,6 +527,7 @@ impl MassMatrix {
                 unknowns: pattern.unknowns(j, i),
                 tensor: if free.rotation { tensor } else { DMat3::ZERO },
                 mass: free.of_displacement(DVec3::splat(inertia.mass)),
+                coupling: inertia.coupling(state.q[state.base(j) + i], || free),
             }
         };
         let nodes = leaf
@@ -546,6 +549,14 @@ impl MassMatrix {
             for (at, mass) in shifts.into_iter().zip(node.mass.to_array()) {
                 product[at] += mass * v[at];
             }
+            if let Some(coupling) = node.coupling {
+                let [turn, shift] = [[a, b, c], shifts].map(|at| DVec3::from(at.map(|k| v[k])));
+                let (turned, shifted) = (coupling * shift, coupling.transpose() * turn);
+                let both = turned.to_array().into_iter().chain(shifted.to_array());
+                for (at, more) in node.unknowns.into_iter().zip(both) {
+                    product[at] += more;
+                }
+            }
         }
         product
     }
@@ -556,6 +567,9 @@ impl MassMatrix {
             let against_displacement = DMat3::from_diagonal(node.mass * factor);
             system.add_rotation_spring(node.rod, node.node, node.tensor * factor);
             system.add_displacement_spring(node.rod, node.node, against_displacement);
+            if let Some(coupling) = node.coupling {
+                system.add_rotation_displacement_coupling(node.rod, node.node, coupling * factor);
+            }
         }
     }
 }
@@ -566,7 +580,9 @@ pub fn mass(leaf: &DiscreteLeaf, physics: &Physics, state: &State, shape: &[Incr
         let inertia = physics.inertia(leaf, j, i);
         let k = state.base(j) + i;
         let (turn, shift) = (rotation_part(&shape[k]), displacement_part(&shape[k]));
-        turn.dot(inertia.tensor(state.q[k]) * turn) + inertia.mass * shift.length_squared()
+        turn.dot(inertia.tensor(state.q[k]) * turn)
+            + inertia.mass * shift.length_squared()
+            + 2.0 * turn.dot(inertia.first_moment(state.q[k]).cross(shift))
     };
     leaf.rod_index_pairs(leaf.moving_nodes()).map(node).sum()
 }
@@ -624,7 +640,9 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces:
         let [a, b] = [j, j + 1].map(|rod| displacement_part(&shape[state.base(rod) + i]));
         sum += (b - a).dot(leaf.node_coupling(j, i) * (b - a));
     }
-    sum + leaf.tissue_curvature(state, shape) + leaf.spring_curvature(state, shape)
+    sum + leaf.tissue_curvature(state, shape)
+        + leaf.spring_curvature(state, shape)
+        + leaf.lever_curvature(state, shape)
 }
 
 /// The contribution of second derivatives with respect to rotations, at constant force.

@@ -5,12 +5,13 @@
 mod constraint_projection;
 mod explicit;
 mod moving_supports;
+mod node_bodies;
 mod physics;
 mod semi_implicit;
 
 use crate::leaf::{DiscreteLeaf, HalfTurn, State};
 pub use crate::motion::constraint_projection::project_constraints;
-pub use crate::motion::explicit::{Explicit, RigidRodError, StableStep};
+pub use crate::motion::explicit::{Explicit, ExplicitRefusal, StableStep};
 pub use crate::motion::physics::{
     AssumedMotion, Inertia, MotionTimes, Physics, SegmentDrag, WindDrag,
 };
@@ -293,6 +294,7 @@ pub fn measure(
         let turning = angular.length_squared() + inertia.polar_excess * spin * spin;
         energy.kinetic += 0.5 * inertia.mass * linear.length_squared();
         energy.kinetic += 0.5 * inertia.transverse * turning;
+        energy.kinetic += inertia.off_axis_energy(state.q[k], [angular, linear]);
         let potential = leaf.load(state, j, i).energy;
         let stretch = leaf.coupling_energy(state, j, i);
         energy.coupling += stretch;

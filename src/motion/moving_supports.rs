@@ -227,7 +227,12 @@ impl MovingSupports {
                 DVec3::ZERO
             };
             let turning = spin.dot(of_node.tensor(it.now.rotation) * spin);
-            0.5 * (of_node.mass * v.linear.length_squared() + turning)
+            let mut energy = 0.5 * (of_node.mass * v.linear.length_squared() + turning);
+            if of_node.is_off_axis() {
+                let first_moment = of_node.first_moment(it.now.rotation);
+                energy += first_moment.dot(v.linear.cross(spin));
+            }
+            energy
         };
         self.nodes.iter().map(energy).sum()
     }

@@ -7,11 +7,13 @@
 //! each of which half of it is applied: of second order in the length of the segments, and its power
 //! is that of the mean velocity.
 
-use crate::leaf::{DiscreteLeaf, Grid, Leaf, Loads, Scale, State};
-use crate::rotation::outer;
+use crate::leaf::{DiscreteLeaf, Grid, Leaf, Lever, Loads, NodeFreedom, Scale, State};
+use crate::rod::Wrench;
+use crate::rotation::{cross_matrix, outer};
 use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule, SupportMotion};
 use glam::{DMat3, DQuat, DVec3};
 use std::cmp::Ordering;
+use std::ops::AddAssign;
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
 /// masses on points there.
@@ -23,6 +25,41 @@ pub struct Inertia {
     pub transverse: f64,
     /// Relative excess of the moment of inertia about d1.
     pub polar_excess: f64,
+    /// Masses off the axis, if there are any.
+    pub off_axis: OffAxisMass,
+}
+
+/// Masses off the axis of a node, along its directors. Their velocity is u + w x R o, with the velocity u of the node,
+/// its angular velocity w and their offset o.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OffAxisMass {
+    /// The sum of masses times offsets.
+    pub first_moment: DVec3,
+    /// Their moments of inertia about the node.
+    pub tensor: DMat3,
+}
+
+impl OffAxisMass {
+    /// Without any.
+    pub const NONE: OffAxisMass = OffAxisMass {
+        first_moment: DVec3::ZERO,
+        tensor: DMat3::ZERO,
+    };
+
+    fn of_point(it: &PointMass) -> Self {
+        let squared = DMat3::from_diagonal(DVec3::splat(it.offset.length_squared()));
+        OffAxisMass {
+            first_moment: it.mass * it.offset,
+            tensor: it.mass * (squared - outer(it.offset, it.offset)),
+        }
+    }
+}
+
+impl AddAssign for OffAxisMass {
+    fn add_assign(&mut self, other: OffAxisMass) {
+        self.first_moment += other.first_moment;
+        self.tensor += other.tensor;
+    }
 }
 
 impl Inertia {
@@ -35,7 +72,72 @@ impl Inertia {
     pub fn tensor(&self, rotation: DQuat) -> DMat3 {
         let d1 = rotation * DVec3::X;
         let excess = self.polar_excess * self.transverse;
-        DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess
+        let on_axis = DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess;
+        if !self.is_off_axis() {
+            return on_axis;
+        }
+        let frame = DMat3::from_quat(rotation);
+        on_axis + frame * self.off_axis.tensor * frame.transpose()
+    }
+
+    /// Whether there are masses off the axis: rotations and displacements are coupled then.
+    pub fn is_off_axis(&self) -> bool {
+        self.off_axis != OffAxisMass::NONE
+    }
+
+    /// The sum s of masses times their distances from the node, along the lab axes.
+    pub fn first_moment(&self, rotation: DQuat) -> DVec3 {
+        match self.is_off_axis() {
+            true => rotation * self.off_axis.first_moment,
+            false => DVec3::ZERO,
+        }
+    }
+
+    /// The angular momentum J w + s x u about the node and the momentum m u + w x s of a node with these velocities
+    /// (w, u).
+    pub fn momentum(&self, rotation: DQuat, [spin, velocity]: [DVec3; 2]) -> [DVec3; 2] {
+        let (angular, linear) = (self.tensor(rotation) * spin, self.mass * velocity);
+        if !self.is_off_axis() {
+            return [angular, linear];
+        }
+        let s = self.first_moment(rotation);
+        [angular + s.cross(velocity), linear + spin.cross(s)]
+    }
+
+    /// What couples the rotation (rows) and the displacement of a node in the mass matrix, if masses off the axis do.
+    /// Held components have no mass.
+    pub fn coupling(
+        &self,
+        rotation: DQuat,
+        freedom: impl FnOnce() -> NodeFreedom,
+    ) -> Option<DMat3> {
+        let free = Some(freedom).filter(|_| self.is_off_axis())?();
+        let axes = free.of_displacement(DVec3::ONE);
+        let coupling = cross_matrix(self.first_moment(rotation)) * DMat3::from_diagonal(axes);
+        free.rotation.then_some(coupling)
+    }
+
+    /// The moment w x J w and the force w x (w x s) that a steady rotation w takes.
+    pub fn centrifugal_wrench(&self, rotation: DQuat, spin: DVec3) -> Wrench {
+        let angular = self.tensor(rotation) * spin;
+        Wrench {
+            moment: spin.cross(angular),
+            force: match self.is_off_axis() {
+                true => spin.cross(spin.cross(self.first_moment(rotation))),
+                false => DVec3::ZERO,
+            },
+        }
+    }
+
+    /// What masses off the axis add to the kinetic energy of a node with these velocities (w, u): s . (u x w) + w . J w/2
+    /// with their own J.
+    pub fn off_axis_energy(&self, rotation: DQuat, [spin, velocity]: [DVec3; 2]) -> f64 {
+        if !self.is_off_axis() {
+            return 0.0;
+        }
+        let own = rotation.conjugate() * spin;
+        let coupled = self.first_moment(rotation).dot(velocity.cross(spin));
+        coupled + 0.5 * own.dot(self.off_axis.tensor * own)
     }
 }
 
@@ -46,6 +148,8 @@ struct PointMass {
     /// Fraction of the vein's length.
     sigma: f64,
     mass: f64,
+    /// Where it is off the axis, along the directors.
+    offset: DVec3,
 }
 
 /// A factor of loads in time.
@@ -73,6 +177,8 @@ pub struct LandingMass {
     pub vein: usize,
     pub sigma: f64,
     pub mass: f64,
+    /// Where it lands off the axis, along the directors.
+    pub offset: DVec3,
     pub velocity: DVec3,
     pub time: f64,
     /// Number of the factor of its weight.
@@ -160,6 +266,7 @@ impl Physics {
             vein: it.vein,
             sigma: it.at,
             mass: it.mass / unit,
+            offset: leaf.point_offset(it),
         });
         physics.point_masses = masses.collect();
         physics
@@ -177,6 +284,7 @@ impl Physics {
                 vein: scenario.points[point].vein,
                 sigma: scenario.points[point].at,
                 mass: landing.mass / (self.density_unit * self.scale.length),
+                offset: leaf.point_offset(&scenario.points[point]),
                 velocity: DVec3::from_array(landing.velocity)
                     * (self.time_unit / self.scale.length),
                 time: landing.from / self.time_unit,
@@ -216,7 +324,15 @@ impl Physics {
             vein: landing.vein,
             sigma: landing.sigma,
             mass: landing.mass,
+            offset: landing.offset,
         });
+    }
+
+    /// Whether masses are off the axes, or will land there.
+    pub fn has_masses_off_axis(&self) -> bool {
+        let offsets = self.point_masses.iter().map(|it| it.offset);
+        let landing = self.landing_masses.iter().map(|it| it.offset);
+        offsets.chain(landing).any(|offset| offset != DVec3::ZERO)
     }
 
     /// Inertia, damping and loads of the small motions about an equilibrium, on which a verdict on its
@@ -328,6 +444,11 @@ impl Physics {
         let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest_node(it.sigma) == i;
         let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
+        let mut off_axis = OffAxisMass::NONE;
+        let beside = self.point_masses.iter().filter(here);
+        for it in beside.filter(|it| it.offset != DVec3::ZERO) {
+            off_axis += OffAxisMass::of_point(it);
+        }
         let dynamics = &self.dynamics;
         let transverse = around(&dynamics.rotary_inertia[j]);
         let polar_excess = match &dynamics.polar_inertia {
@@ -338,6 +459,7 @@ impl Physics {
             mass: length * around(&dynamics.density[j]) / self.density_unit + on_points,
             transverse: length * transverse / rotary,
             polar_excess,
+            off_axis,
         }
     }
 
@@ -402,6 +524,16 @@ impl Physics {
         forces
             .map(|it| excess(it.factor) * it.force.dot(vectors(it.rod, it.node)))
             .sum()
+    }
+
+    /// The present forces off the axes that vary, less those at time 0.
+    pub fn scheduled_lever_excess(&self, leaf: &DiscreteLeaf) -> impl Iterator<Item = Lever> {
+        let scheduled = leaf.scheduled_loads.iter();
+        let levers = scheduled.flat_map(|it| it.levers.iter().map(|lever| (&it.factors, lever)));
+        levers.map(|(factors, (number, lever))| Lever {
+            force: (factors[*number] - self.load_factors[*number].first) * lever.force,
+            ..*lever
+        })
     }
 
     /// The loads with these values, without dimensions.

@@ -124,6 +124,12 @@ fn check(scenario: &Scenario) -> Result<(), PostureError> {
             "dead moments have no potential: give forces",
         ),
         (
+            scenario.points.iter().any(PointLoad::is_off_axis),
+            "load.point.offset",
+            "the moment of a force off the axis depends on how the section is turned: leave it out, so that the force \
+             acts on the axis",
+        ),
+        (
             scenario.base_held != BaseSupport::Clamped,
             "leaf.base_held",
             "a base that turns adds a stiffness of its own: clamp it (leave this out), and begin the points above it",

@@ -331,7 +331,7 @@ impl Scenario {
             && (0..self.rods.len()).all(even)
             && flat(self.g)
             && (self.distributed.iter().flatten()).all(|load| load[2].max_abs() == 0.0)
-            && self.points.iter().all(|point| flat(point.force))
+            && (self.points.iter()).all(|point| flat(point.force) && point.offset[1] == 0.0)
             && self.grips.iter().all(|grip| flat(grip.displacement))
             && flat(self.tip_force)
             && !self.has_moments()

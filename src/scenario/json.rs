@@ -115,7 +115,7 @@ impl Scenario {
                 "vein": point.vein + 1, "at": point.at,
                 "mass": point.landing.map_or(point.mass, |landing| landing.mass),
                 "force": list_value(force), "moment": list_value(moment),
-                "follows": point.follows,
+                "follows": point.follows, "offset": list_value(point.offset),
             });
             if let Some(landing) = point.landing {
                 row["from"] = number_value(landing.from);

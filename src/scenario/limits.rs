@@ -57,6 +57,7 @@ struct LeafLimits {
     /// Weight of the mass of a point: as for forces.
     point_weight: DimensionlessLimit,
     point_mass: DimensionlessLimit,
+    point_offset: DimensionlessLimit,
     /// At the limit a thousandth of the digits of positions is lost.
     base_distance: DimensionlessLimit,
     base_turn: DimensionlessLimit,
@@ -163,6 +164,11 @@ const LIMITS: LeafLimits = LeafLimits {
     rod_weight: upper_limit("|g| rho L^3/A", 1e8, WEIGHT_REASON),
     point_weight: upper_limit("|g| m L^2/A", 1e8, WEIGHT_REASON),
     point_mass: upper_limit("m/(rho_mean L)", 1e12, NATURAL_UNITS_REASON),
+    point_offset: upper_limit(
+        "|offset|/L",
+        1e3,
+        "L is the longest rod: choose a place closer to the axis",
+    ),
     base_distance: upper_limit(
         "|base|/L",
         1e3,
@@ -698,6 +704,14 @@ fn check_point_loads(entries: &Entries, scenario: &Scenario) -> ScenarioResult<(
         LIMITS
             .point_weight
             .check(weighed, vector_norm(scenario.g) / force * whole)?;
+        let beside = item(Key::PointOffset)?;
+        let lever = point.offset[0].hypot(point.offset[1]);
+        let length = scenario.unit(Key::PointOffset);
+        LIMITS.point_offset.check(beside, lever / length)?;
+        let weight = vector_norm(scenario.g) * whole;
+        LIMITS
+            .tip_moment
+            .check(beside, lever * (vector_norm(given) + weight) / moment)?;
         if let Some(Landing { from, velocity, .. }) = point.landing {
             let unit = |key| scenario.unit(key);
             LIMITS

@@ -11,6 +11,7 @@ use crate::scenario::schedule::{Schedule, scaled};
 use crate::scenario::section::Property;
 use crate::scenario::veins::{Rod, Scale, StiffnessSource};
 use crate::words;
+use glam::DVec3;
 
 /// A load on a point of a vein, at rest.
 #[derive(Clone, Debug, PartialEq)]
@@ -28,6 +29,8 @@ pub struct PointLoad {
     pub follows: bool,
     /// The mass, which [`Scenario::g`](crate::scenario::Scenario::g) pulls; not negative.
     pub mass: f64,
+    /// Where force and mass are off the axis, lengths along the directors d2 and d3 of the section.
+    pub offset: [f64; 2],
     /// The force and the moment in time, if they vary; those at rest are those of time 0.
     pub in_time: Option<Box<VaryingPointLoad>>,
     /// The mass that lands on the point, if one does; [`PointLoad::mass`] is zero then.
@@ -58,6 +61,17 @@ pub struct VaryingPointLoad {
 }
 
 impl PointLoad {
+    /// Whether force and mass are off the axis.
+    pub fn is_off_axis(&self) -> bool {
+        self.offset != [0.0; 2]
+    }
+
+    /// Where force and mass are off the axis, along the directors.
+    pub fn arm(&self) -> DVec3 {
+        let [along_2, along_3] = self.offset;
+        DVec3::new(0.0, along_2, along_3)
+    }
+
     /// The load at rest that is this one at a time.
     pub fn at_time(&self, time: f64) -> PointLoad {
         let mut at = self.clone();
@@ -256,6 +270,7 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
         moment,
         follows,
         mass: item(Key::PointMass)?.number()?,
+        offset: item(Key::PointOffset)?.place_in_section()?,
         in_time: varying,
         landing: read_landing(entries, row)?,
     };

@@ -11,10 +11,11 @@ use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioSource;
 use crate::scenario::format::units::Units;
 use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
-use crate::scenario::loads::{check_single_rod_moments, read_dynamics, read_wind};
+use crate::scenario::loads::{PointLoad, check_single_rod_moments, read_dynamics, read_wind};
 use crate::scenario::photo::read_photo;
 use crate::scenario::schedule::Schedule;
 use crate::scenario::support_motion::read_support_motion;
+use crate::scenario::supports::{Grip, SupportKind};
 use crate::scenario::veins::{StiffnessSource, read_joined, read_tissue, read_veins};
 use crate::scenario::{limits, loads, supports};
 use std::fs::File;
@@ -164,6 +165,7 @@ impl Entries {
     pub fn check(&self) -> ScenarioResult<Scenario> {
         let scenario = self.read().map_err(|error| self.error_with_others(error))?;
         limits::check_limits(self, &scenario)?;
+        check_masses_off_axis(self, &scenario)?;
         Ok(scenario)
     }
 
@@ -329,6 +331,37 @@ fn read_coupling(entries: &Entries, gaps: usize) -> ScenarioResult<Vec<[f64; 3]>
         }
     }
     Ok(coupling)
+}
+
+/// Refuses a mass off the axis of a section that turns freely about a place which moves in time.
+fn check_masses_off_axis(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
+    for (row, point) in scenario.points.iter().enumerate() {
+        let mass = point.landing.map_or(point.mass, |landing| landing.mass);
+        if point.is_off_axis() && mass > 0.0 {
+            let item = entries.value_in_row(Key::PointOffset, row)?;
+            item.refuse_unless(
+                !swings_on_moving_support(scenario, point),
+                "is of a mass where a pinned holder moves in time, which would swing it: clamp the holder, or place \
+                 the mass elsewhere",
+            )?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether the section of a point turns freely about a place that moves in time.
+fn swings_on_moving_support(scenario: &Scenario, point: &PointLoad) -> bool {
+    let Some(motion) = &scenario.support_motion else {
+        return false;
+    };
+    let holds = |(grip, moves): (&Grip, &Schedule<[f64; 3]>)| {
+        let here = grip.vein == point.vein && (grip.at[0]..=grip.at[1]).contains(&point.at);
+        here && grip.held == SupportKind::Pinned && !moves.is_constant()
+    };
+    let tip = scenario.held_tip.as_ref();
+    let on_tip = motion.tip.is_some() && point.at == 1.0;
+    let turns = on_tip && tip.is_some_and(|held| held.clamps.is_none());
+    turns || scenario.grips.iter().zip(&motion.grips).any(holds)
 }
 
 fn read_tolerance(item: EntryValue) -> ScenarioResult<f64> {

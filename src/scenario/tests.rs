@@ -137,6 +137,7 @@ fn what_is_written_is_read_again_as_the_same() {
         dynamics.rest={mean = 1, amplitude = 0.5, frequency = 0.1} =>
         dynamics.rest={at = [0, 1], value = [1, 2], smooth = true} =>
         leaf.base=[0.1, 0, 0]; load.gravity=[0, 0, -1e-4] =>
+        load.point[0].offset=[0.1, -0.2] =>
         tissue.along=0; tissue.across=0; tissue.fold=0 =>
     ";
     for (overrides, _) in pairs(table) {
@@ -245,6 +246,12 @@ fn what_cannot_be_is_refused() {
         load.point[0].moment=[1, 0, 0] => a moment on a point needs leaf.rods = 1 (here 3)
         load.point[0].mass=-1 => must not be negative
         load.point[0].force=[0, 0, 1e9] => gives |F| L^2/A
+        load.point[0].offset=[1] => has 1 entries: must have 2, along the directors d2 and d3
+        load.point[0].offset=1 => must be a list of two numbers, along d2 and d3
+        load.point[0].offset[2]=1 => has the components 0 and 1, along d2 and d3
+        load.point[0].offset=[0, inf] => must be a finite number
+        load.point[0].offset=[0, 1e9] => gives |offset|/L
+        load.point[0].mass=0.01; load.point[0].offset=[0, 1]; grip[0].held=pinned; grip[0].move={at = [0, 1], value = [[0, 0, 0], [0, 0, 1]]} => is of a mass where a pinned holder moves in time
         load.gravity=[[0, 0, 1], [0, 0, 1]] => has 2 entries: must have 3, one per rod
         load.gravity=3 => must be a list of three numbers [x, y, z], or a list of 3 of them (one per rod)
         load.gravity=[[0, 0, 1], [0, 0, 1], [0, 1]] => load.gravity, entry 3 = [0, 1]: has 2 entries
@@ -365,7 +372,8 @@ fn the_schema_has_tables_within_tables() {
     assert_eq!(
         names,
         [
-            "at", "factor", "follows", "force", "from", "mass", "moment", "vein", "velocity"
+            "at", "factor", "follows", "force", "from", "mass", "moment", "offset", "vein",
+            "velocity"
         ]
     );
     assert_eq!(

@@ -205,6 +205,7 @@ impl Scenario {
             && !gaps.clone().any(tissue)
             && !self.grips.iter().any(clamps)
             && !self.has_moments_on(&(vein..vein + 1))
+            && !self.has_levers_on(&(vein..vein + 1))
     }
 
     fn spin_rotation(&self, vein: usize) -> ZeroEnergyRotation {
@@ -381,6 +382,13 @@ impl Scenario {
             .any(|it| *it != DVec3::ZERO)
     }
 
+    /// Whether dead forces act off the axis of a vein of a group: their energy depends on how its sections
+    /// are turned.
+    fn has_levers_on(&self, group: &Range<usize>) -> bool {
+        let mut points = self.points.iter().filter(|it| group.contains(&it.vein));
+        points.any(|point| point.is_off_axis() && self.force_on(point) != [0.0; 3])
+    }
+
     /// The dead moments on a group of veins.
     fn group_moments(&self, group: &Range<usize>) -> Vec<DVec3> {
         let points = self.points.iter().filter(|it| group.contains(&it.vein));
@@ -449,6 +457,7 @@ impl Scenario {
             && grips.all(|grip| along(grip.displacement))
             && self.supports_are_isotropic(&group, axis)
             && !self.has_moments_on(&group)
+            && !self.has_levers_on(&group)
             && held
             && self.coupling_is_isotropic(&group, axis)
             // Comparing profiles takes longest.

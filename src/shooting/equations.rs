@@ -31,7 +31,7 @@ use crate::scenario::{
 use crate::shape::NodeState;
 use crate::shooting::follower_loads::FollowerLoads;
 use crate::shooting::rod_state::{
-    RodState, STATE_SIZE, SlopeDerivatives, cross_matrix, rotation_difference,
+    JumpDerivatives, RodState, STATE_SIZE, SlopeDerivatives, cross_matrix, rotation_difference,
 };
 use crate::shooting::tissue::{FrameRates, TissueEnergy};
 use crate::shooting::tissue_stresses::{RodSection, TissueState};
@@ -56,6 +56,8 @@ pub struct BoundaryValueProblem<'a> {
     foundation: Option<Natural<'a>>,
     /// Whether veins have loads of their own.
     own_loads: bool,
+    /// Whether dead forces act on points off the axis.
+    levers: bool,
     /// Loads without a potential, if there are such.
     followers: Option<FollowerLoads<'a>>,
     gravity: DVec3,
@@ -179,6 +181,7 @@ impl<'a> BoundaryValueProblem<'a> {
             tissue,
             foundation: (scenario.foundation.is_some()).then(|| Natural::new(scenario, true)),
             own_loads: scenario.has_own_loads(),
+            levers: scenario.points.iter().any(PointLoad::is_off_axis),
             followers: FollowerLoads::new(scenario, length, force),
             gravity: DVec3::from_array(scenario.gravity) * (length / force),
             tip_force: DVec3::from_array(scenario.tip_force) / force,
@@ -489,7 +492,7 @@ impl<'a> BoundaryValueProblem<'a> {
         let forces = rods
             .iter()
             .enumerate()
-            .map(|(j, rod)| rod.n - self.tip_point_load(j, &followers).force);
+            .map(|(j, rod)| rod.n - self.tip_point_load(j, rod.q, &followers).force);
         let force: DVec3 = forces.sum();
         (rods.iter().enumerate())
             .flat_map(|(j, rod)| {
@@ -499,7 +502,7 @@ impl<'a> BoundaryValueProblem<'a> {
                     (TipConstraint::Free, _) => {
                         rod.n
                             - self.load_lambda * self.tip_force
-                            - self.tip_point_load(j, &followers).force
+                            - self.tip_point_load(j, rod.q, &followers).force
                     }
                     (TipConstraint::Pinned | TipConstraint::Clamped, _) => {
                         rod.r - self.held_tips[j].position
@@ -512,7 +515,7 @@ impl<'a> BoundaryValueProblem<'a> {
                     _ => {
                         rod.m
                             - self.load_lambda * self.tip_moment
-                            - self.tip_point_load(j, &followers).moment
+                            - self.tip_point_load(j, rod.q, &followers).moment
                     }
                 };
                 [first.to_array(), second.to_array()].concat()
@@ -537,8 +540,8 @@ impl<'a> BoundaryValueProblem<'a> {
             .sum();
         let points = self
             .point_loads_at(1.0)
-            .map(|(j, load)| load.force.dot(RodState::from_flat_state(y, j).r));
-        -self.load_lambda * work - points.sum::<f64>()
+            .map(|load| load.energy(&RodState::from_flat_state(y, load.rod)));
+        -self.load_lambda * work + points.sum::<f64>()
     }
 }
 
@@ -666,15 +669,48 @@ impl BoundaryValueProblem<'_> {
             rod.write_flat_state(y, j);
             any = true;
         }
-        for (j, load) in self.point_loads_at(sigma) {
+        for load in self.point_loads_at(sigma) {
+            let j = load.rod;
             let mut rod = RodState::from_flat_state(y, j);
             rod.n -= load.force;
-            rod.m -= load.moment;
-            y[STATE_SIZE * self.rods()] -= load.force.dot(rod.r);
+            rod.m -= load.moment_on(rod.q);
+            y[STATE_SIZE * self.rods()] += load.energy(&rod);
             rod.write_flat_state(y, j);
             any = true;
         }
         any
+    }
+
+    /// The derivatives of the jumps by loads on points at `sigma` in this state, each with its rod, of those
+    /// that depend on the rotation of the section.
+    pub fn jump_derivatives_at(&self, sigma: f64, y: &[f64]) -> Vec<(usize, JumpDerivatives)> {
+        let followers = self.follower_points_at(sigma, y);
+        let mut jumps: Vec<_> = followers
+            .iter()
+            .map(|(j, load)| (*j, JumpDerivatives::of_follower(load)))
+            .collect();
+        if self.levers {
+            let off_axis = self
+                .point_loads_at(sigma)
+                .filter(DeadPointLoad::is_off_axis);
+            jumps.extend(off_axis.map(|load| {
+                let arm = RodState::from_flat_state(y, load.rod).q * load.arm;
+                (load.rod, JumpDerivatives::of_lever(arm, load.force))
+            }));
+        }
+        jumps
+    }
+
+    /// The sums of these derivatives at the tips, rod by rod; empty without any.
+    pub fn tip_jump_derivatives(&self, y: &[f64]) -> Vec<JumpDerivatives> {
+        if self.followers.is_none() && !self.levers {
+            return Vec::new();
+        }
+        let mut all = vec![JumpDerivatives::ZERO; self.rods()];
+        for (j, jump) in self.jump_derivatives_at(1.0, y) {
+            all[j] += jump;
+        }
+        all
     }
 
     /// What loads on points at `sigma` that turn with the section exert in this state, each with its rod.
@@ -708,7 +744,7 @@ impl BoundaryValueProblem<'_> {
     }
 
     /// The dead loads on points at `sigma`, each with its rod.
-    fn point_loads_at(&self, sigma: f64) -> impl Iterator<Item = (usize, Wrench)> {
+    fn point_loads_at(&self, sigma: f64) -> impl Iterator<Item = DeadPointLoad> {
         let points = self
             .scenario
             .points
@@ -721,22 +757,56 @@ impl BoundaryValueProblem<'_> {
                 true => DVec3::ZERO,
                 false => moment_unit * DVec3::from_array(point.moment),
             };
-            let load = Wrench {
+            DeadPointLoad {
+                rod: point.vein,
                 force: unit * DVec3::from_array(self.scenario.force_on(point)),
                 moment: dead_moment,
-            };
-            (point.vein, load)
+                arm: point.arm() / self.length_unit,
+            }
         })
     }
 
-    /// What loads on points exert on the tip of rod `j`, those that turn with it in this state.
-    fn tip_point_load(&self, j: usize, followers: &[Wrench]) -> Wrench {
-        let here = self.point_loads_at(1.0).filter(|(rod, _)| *rod == j);
+    /// What loads on points exert on the tip of rod `j` with the rotation `q`, those that turn with it in this
+    /// state.
+    fn tip_point_load(&self, j: usize, q: DQuat, followers: &[Wrench]) -> Wrench {
+        let here = self.point_loads_at(1.0).filter(|load| load.rod == j);
         let own = followers.get(j).copied().unwrap_or_default();
-        here.fold(own, |sum, (_, load)| Wrench {
+        here.fold(own, |sum, load| Wrench {
             force: sum.force + load.force,
-            moment: sum.moment + load.moment,
+            moment: sum.moment + load.moment_on(q),
         })
+    }
+}
+
+/// A dead load on a point of a rod.
+struct DeadPointLoad {
+    rod: usize,
+    force: DVec3,
+    moment: DVec3,
+    /// Where the force acts off the axis, along the directors.
+    arm: DVec3,
+}
+
+impl DeadPointLoad {
+    /// Whether the force acts off the axis.
+    fn is_off_axis(&self) -> bool {
+        self.arm != DVec3::ZERO && self.force != DVec3::ZERO
+    }
+
+    /// The moment on a section with the rotation `q`.
+    fn moment_on(&self, q: DQuat) -> DVec3 {
+        match self.is_off_axis() {
+            true => self.moment + (q * self.arm).cross(self.force),
+            false => self.moment,
+        }
+    }
+
+    /// The potential energy of the force on a rod in this state.
+    fn energy(&self, rod: &RodState) -> f64 {
+        match self.is_off_axis() {
+            true => -self.force.dot(rod.r + rod.q * self.arm),
+            false => -self.force.dot(rod.r),
+        }
     }
 }
 

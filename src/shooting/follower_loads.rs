@@ -115,9 +115,14 @@ impl<'a> FollowerLoads<'a> {
     /// What a load on a point that turns with the section exerts on it, times a factor.
     pub fn on_point(&self, point: &PointLoad, rod: &RodState, factor: f64) -> Wrench {
         let unit = factor / self.force_unit;
+        let force = DVec3::from_array(point.force);
+        let mut moment = DVec3::from_array(point.moment);
+        if point.is_off_axis() {
+            moment += point.arm().cross(force);
+        }
         Wrench {
-            force: unit * (rod.q * DVec3::from_array(point.force)),
-            moment: unit / self.length_unit * (rod.q * DVec3::from_array(point.moment)),
+            force: unit * (rod.q * force),
+            moment: unit / self.length_unit * (rod.q * moment),
         }
     }
 }

@@ -5,11 +5,10 @@ use crate::natural::{
     ERROR_WEIGHTS_3, ERROR_WEIGHTS_5, RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES,
 };
 use crate::numbers::{larger, largest};
-use crate::rod::Wrench;
 use crate::scenario::{RodPlace, Side};
 use crate::shape::RodShape;
 use crate::shooting::equations::{BoundaryValueProblem, FRACTION_TOLERANCE};
-use crate::shooting::rod_state::{RodState, STATE_SIZE};
+use crate::shooting::rod_state::{JumpDerivatives, RodState, STATE_SIZE};
 use crate::shooting::tissue_stresses::TissueState;
 use glam::DVec3;
 
@@ -58,9 +57,9 @@ pub struct InitialValueIntegrator<'e, 'a> {
     pub y: Vec<f64>,
     /// Sigma of the last loads on points that were passed.
     last_point_load: f64,
-    /// Loads on points that turn with the section, each with its rod, that were passed at the beginning of the
-    /// last step.
-    pub passed_followers: Vec<(usize, Wrench)>,
+    /// Rods whose loads on points were passed at the beginning of the last step, with the derivatives of the
+    /// jumps there.
+    pub passed_loads: Vec<(usize, JumpDerivatives)>,
     /// Proposed size of the next step.
     step: f64,
     /// Width of the last step.
@@ -90,7 +89,7 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
             tolerance,
             sigma,
             last_point_load: f64::NEG_INFINITY,
-            passed_followers: Vec::new(),
+            passed_loads: Vec::new(),
             step: 0.0,
             last_step: 0.0,
             stages: blank(),
@@ -139,10 +138,9 @@ impl<'e, 'a> InitialValueIntegrator<'e, 'a> {
         // States are those just before a load on a point, which the first step beyond it passes; a
         // second stop within rounding of it does not.
         let beyond = self.sigma - self.last_point_load > FRACTION_TOLERANCE;
-        self.passed_followers.clear();
+        self.passed_loads.clear();
         if beyond {
-            let followers = self.equations.follower_points_at(self.sigma, &self.y);
-            self.passed_followers = followers;
+            self.passed_loads = self.equations.jump_derivatives_at(self.sigma, &self.y);
         }
         if beyond && self.equations.apply_point_loads(self.sigma, &mut self.y) {
             self.last_point_load = self.sigma;

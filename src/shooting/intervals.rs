@@ -11,12 +11,13 @@
 mod tests;
 
 use crate::numbers::{larger, largest};
-use crate::rod::Wrench;
 use crate::shooting::equations::{BoundaryValueProblem, TipConstraint};
 use crate::shooting::integrate::{
     InitialValueIntegrator, LeafTrajectory, ResultantSizes, ShootingNodes, UnboundedSolution,
 };
-use crate::shooting::rod_state::{PERTURBATION_SIZE, RodState, rotation_difference};
+use crate::shooting::rod_state::{
+    JumpDerivatives, PERTURBATION_SIZE, RodState, rotation_difference,
+};
 use crate::shooting::sensitivities::{LinearStep, Perturbations, coupled_rods};
 use faer::{Col, ColRef, Mat};
 use glam::DVec3;
@@ -385,20 +386,21 @@ pub struct CondensedEquations {
     /// The first of the components that are free at the base.
     free_at_base: usize,
     units: PerturbationUnits,
-    /// What loads that turn with the section exert on the tips; empty without any.
-    tip_followers: Vec<Wrench>,
+    /// Derivatives of what loads on points at the tips add to n and m there; empty if these do not depend on
+    /// rotations.
+    tip_jumps: Vec<JumpDerivatives>,
 }
 
 impl CondensedEquations {
     /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turns` of
     /// veins that can turn without resistance, at the base, are left undetermined where they are
-    /// what the conditions determine least. `tip_followers` are the loads on the tips that turn with the section.
+    /// what the conditions determine least. `tip_jumps` are the derivatives of the loads on points at the tips.
     pub fn new(
         equations: &BoundaryValueProblem,
         units: &PerturbationUnits,
         maps: Vec<Mat<f64>>,
         turns: &[Vec<f64>],
-        tip_followers: Vec<Wrench>,
+        tip_jumps: Vec<JumpDerivatives>,
     ) -> Option<Self> {
         let (mut bases, mut growths) = (Vec::new(), Vec::new());
         let mut reached = maps[0].clone();
@@ -411,7 +413,7 @@ impl CondensedEquations {
         }
         let tip = equations.tip_constraint();
         let columns: Vec<Vec<f64>> = (reached.col_iter())
-            .map(|column| linearized_tip_conditions(tip, units, &tip_followers, column))
+            .map(|column| linearized_tip_conditions(tip, units, &tip_jumps, column))
             .collect();
         let conditions = Mat::from_fn(columns.len(), columns.len(), |i, c| columns[c][i]);
         if !conditions.is_all_finite() {
@@ -431,7 +433,7 @@ impl CondensedEquations {
             tip,
             free_at_base: equations.first_free_component(),
             units: units.clone(),
-            tip_followers,
+            tip_jumps,
         };
         let least = orthonormal_basis(
             (0..turns.len()).map(|k| march.weakly_determined_direction(k).swap_remove(0)),
@@ -487,7 +489,7 @@ impl CondensedEquations {
             for (sum, value) in missed.iter_mut().zip(linearized_tip_conditions(
                 self.tip,
                 &self.units,
-                &self.tip_followers,
+                &self.tip_jumps,
                 carried.as_ref(),
             )) {
                 *sum -= value;
@@ -549,27 +551,27 @@ impl CondensedEquations {
     }
 }
 
-/// Linearized tip conditions of a perturbation at the tip, where these loads turn with the section.
+/// Linearized tip conditions of a perturbation at the tip, where loads depend on the rotation of the section.
 fn linearized_tip_conditions(
     tip: TipConstraint,
     units: &PerturbationUnits,
-    followers: &[Wrench],
+    jumps: &[JumpDerivatives],
     perturbation: ColRef<f64>,
 ) -> Vec<f64> {
     let rods = perturbation.nrows() / PERTURBATION_SIZE;
     let own = |j: usize, k: usize| perturbation[PERTURBATION_SIZE * j + k];
     // Force and moment but for the changes of these loads.
-    let get = |j: usize, k: usize| match followers.get(j).filter(|_| k >= 6) {
+    let get = |j: usize, k: usize| match jumps.get(j).filter(|_| k >= 6) {
         None => own(j, k),
-        Some(load) => {
+        Some(jump) => {
             let turn = DVec3::from_array([3, 4, 5].map(|k| own(j, k)));
             let change = match k < 9 {
-                true => turn.cross(load.force)[k - 6],
-                false => turn.cross(load.moment)[k - 9],
+                true => (jump.n_theta * turn)[k - 6],
+                false => (jump.m_theta * turn)[k - 9],
             };
             let [rotation, resultant] =
                 [3, k].map(|k| units.component_unit(PERTURBATION_SIZE * j + k));
-            own(j, k) - change * (rotation / resultant)
+            own(j, k) + change * (rotation / resultant)
         }
     };
     (0..rods)

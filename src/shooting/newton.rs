@@ -341,7 +341,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             &self.units,
             maps,
             &self.zero_energy_changes(),
-            self.equations.tip_followers(&last.end_state),
+            self.equations.tip_jump_derivatives(&last.end_state),
         );
         match self.condensed {
             Some(_) => Ok(residuals),

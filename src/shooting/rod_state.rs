@@ -1,8 +1,11 @@
 //! One rod at one sigma, as the boundary-value problem has it: its state among the numbers of all rods, its
 //! perturbation, and the derivatives of its slopes.
 
-use crate::rotation::Pose;
+use crate::rod::Wrench;
+pub use crate::rotation::cross_matrix;
+use crate::rotation::{Pose, outer};
 use glam::{DMat3, DQuat, DVec3};
+use std::ops::AddAssign;
 
 /// Numbers that describe one rod at one sigma: r, q (x, y, z, w), n, m.
 pub const STATE_SIZE: usize = 13;
@@ -78,6 +81,48 @@ pub struct SlopeDerivatives {
     pub by_loads: Option<LoadDerivatives>,
 }
 
+/// Derivatives of the jumps of n and m where a load on a point is passed, with respect to the rotation of its
+/// section.
+#[derive(Clone, Copy, Debug)]
+pub struct JumpDerivatives {
+    /// Derivative of n.
+    pub n_theta: DMat3,
+    /// Derivative of m.
+    pub m_theta: DMat3,
+}
+
+impl JumpDerivatives {
+    /// Of loads that do not depend on the rotation.
+    pub const ZERO: JumpDerivatives = JumpDerivatives {
+        n_theta: DMat3::ZERO,
+        m_theta: DMat3::ZERO,
+    };
+
+    /// Of a load that turns with the section: the jumps are minus its force and its moment.
+    pub fn of_follower(load: &Wrench) -> Self {
+        JumpDerivatives {
+            n_theta: cross_matrix(load.force),
+            m_theta: cross_matrix(load.moment),
+        }
+    }
+
+    /// Of a dead force on an arm that turns with the section: its moment is `arm` x `force`.
+    pub fn of_lever(arm: DVec3, force: DVec3) -> Self {
+        let along = DMat3::from_diagonal(DVec3::splat(arm.dot(force)));
+        JumpDerivatives {
+            n_theta: DMat3::ZERO,
+            m_theta: along - outer(arm, force),
+        }
+    }
+}
+
+impl AddAssign for JumpDerivatives {
+    fn add_assign(&mut self, other: JumpDerivatives) {
+        self.n_theta += other.n_theta;
+        self.m_theta += other.m_theta;
+    }
+}
+
 /// Derivatives of n' and m' by loads without a potential.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoadDerivatives {
@@ -87,11 +132,6 @@ pub struct LoadDerivatives {
     pub n_n: DMat3,
     /// Derivative of m' with respect to the rotation.
     pub m_theta: DMat3,
-}
-
-/// The matrix \[a\] with \[a\] b = a x b.
-pub fn cross_matrix(a: DVec3) -> DMat3 {
-    DMat3::from_cols(a.cross(DVec3::X), a.cross(DVec3::Y), a.cross(DVec3::Z))
 }
 
 /// The rotation vector from `b` to `a`, to first order.

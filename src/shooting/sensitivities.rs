@@ -3,11 +3,10 @@
 //! itself.
 
 use crate::natural::{RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
-use crate::rod::Wrench;
 use crate::scenario::RodPlace;
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
-use crate::shooting::rod_state::{PERTURBATION_SIZE, SlopeDerivatives, cross_matrix};
+use crate::shooting::rod_state::{JumpDerivatives, PERTURBATION_SIZE, SlopeDerivatives};
 use crate::shooting::tissue::{GapTangent, PAIR_PERTURBATION_SIZE};
 use crate::shooting::tissue_stresses::{LinearStresses, StressChanges, TissueState};
 use glam::DMat3;
@@ -26,8 +25,8 @@ pub struct LinearStep {
     tissue: Vec<GapMatrix>,
     /// Stage by stage, the linearized stresses that are unknowns; empty if there are none.
     stresses: Vec<LinearStresses>,
-    /// Loads on points that turn with the section, each with its rod, at the beginning of the step.
-    followers: Vec<(usize, Wrench)>,
+    /// Rods with loads on points at the beginning of the step, and the derivatives of the jumps there.
+    passed_loads: Vec<(usize, JumpDerivatives)>,
 }
 
 impl LinearStep {
@@ -46,7 +45,7 @@ impl LinearStep {
             derivatives: Vec::with_capacity(STAGES * rods),
             tissue: Vec::new(),
             stresses: Vec::new(),
-            followers: integrator.passed_followers.clone(),
+            passed_loads: integrator.passed_loads.clone(),
         };
         let mut state = TissueState::default();
         for (y, node) in integrator.stages.iter().zip(STAGE_NODES) {
@@ -103,10 +102,10 @@ impl<const W: usize> Perturbations<W> {
         }
     }
 
-    /// Passes a load on a point that turns with the section: by it n and m jump, and their perturbations by its
-    /// change.
-    fn pass_follower(&mut self, first: usize, load: &Wrench) {
-        let (force, moment) = (cross_matrix(load.force), cross_matrix(load.moment));
+    /// Passes a load on a point that depends on the rotation of the section: by it n and m jump, and their
+    /// perturbations by its change.
+    fn pass_point_load(&mut self, first: usize, jump: &JumpDerivatives) {
+        let (force, moment) = (jump.n_theta, jump.m_theta);
         let rows: &mut [[f64; W]] = self.entries.as_chunks_mut().0;
         for r in 0..3 {
             for c in 0..3 {
@@ -126,9 +125,9 @@ impl<const W: usize> Perturbations<W> {
 
     /// Propagates the perturbations through a step.
     pub fn propagate(&mut self, equations: &BoundaryValueProblem, step: &LinearStep) {
-        for (j, load) in &step.followers {
+        for (j, jump) in &step.passed_loads {
             if self.rods.contains(j) {
-                self.pass_follower(PERTURBATION_SIZE * (j - self.rods.start), load);
+                self.pass_point_load(PERTURBATION_SIZE * (j - self.rods.start), jump);
             }
         }
         for i in 0..STAGES {

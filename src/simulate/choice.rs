@@ -4,7 +4,9 @@
 //! times.
 
 use crate::leaf::{DiscreteLeaf, State};
-use crate::motion::{Explicit, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator};
+use crate::motion::{
+    Explicit, ExplicitRefusal, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator,
+};
 use crate::numbers::format_two_digits;
 use crate::simulate::request::{Options, Scheme};
 use crate::words;
@@ -18,6 +20,8 @@ words! {
         Requested = "requested",
         /// The explicit method has no stable step for rigid rods.
         RigidRods = "rigid-rods",
+        /// The explicit method does not move masses off the axis.
+        MassesOffAxis = "masses-off-axis",
         /// The base is free, and the semi-implicit method holds it.
         FreeBase = "free-base",
         /// A load has a pulse that is too short for the semi-implicit method.
@@ -43,7 +47,11 @@ pub struct SchemeChoice {
 
 impl SchemeChoice {
     /// The choice that does not depend on costs, if there is one.
-    pub(super) fn forced_choice(options: &Options, physics: &Physics, rigid: bool) -> Option<Self> {
+    pub(super) fn forced_choice(
+        options: &Options,
+        physics: &Physics,
+        obstacle: Option<ExplicitRefusal>,
+    ) -> Option<Self> {
         let of = |scheme, reason| SchemeChoice {
             scheme,
             reason,
@@ -52,8 +60,12 @@ impl SchemeChoice {
         if let Some(scheme) = options.scheme {
             return Some(of(scheme, SchemeReason::Requested));
         }
-        if rigid {
-            return Some(of(Scheme::SemiImplicit, SchemeReason::RigidRods));
+        if let Some(obstacle) = obstacle {
+            let reason = match obstacle {
+                ExplicitRefusal::RigidRod => SchemeReason::RigidRods,
+                ExplicitRefusal::MassOffAxis => SchemeReason::MassesOffAxis,
+            };
+            return Some(of(Scheme::SemiImplicit, reason));
         }
         let reason = if !physics.clamped() {
             SchemeReason::FreeBase
@@ -87,6 +99,7 @@ impl fmt::Display for SchemeChoice {
             SchemeReason::RigidRods => {
                 "the explicit method cannot move rigid rods (a stiffness is inf)"
             }
+            SchemeReason::MassesOffAxis => "the explicit method does not move masses off the axis",
             SchemeReason::FreeBase => {
                 "the semi-implicit method holds the base, and this one is free"
             }

@@ -30,10 +30,10 @@ pub(crate) mod start;
 
 pub use crate::leaf::HalfTurn;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf, State};
-pub use crate::motion::{Energy, Stopped};
+pub use crate::motion::{Energy, ExplicitRefusal, Stopped};
 use crate::motion::{
-    Explicit, Impact, MotionTimes, Physics, RigidRodError, SemiImplicit, Snapshot, StableStep,
-    StepControl, TimeIntegrator,
+    Explicit, Impact, MotionTimes, Physics, SemiImplicit, Snapshot, StableStep, StepControl,
+    TimeIntegrator,
 };
 use crate::relax;
 use crate::relax::{Equilibrium, EquilibriumTracker, RelaxError, StateOnGrid};
@@ -136,9 +136,9 @@ impl Simulation {
         let state = state(&leaf, &grid)?;
         let discrete = DiscreteLeaf::new(&leaf, grid.clone());
         let doubt = unstable_start_doubt(&discrete, &physics, &state);
-        let rigid = discrete.least_compliance() == 0.0;
+        let obstacle = ExplicitRefusal::of_leaf(&discrete, &physics);
         let mut begun = None;
-        let choice = match SchemeChoice::forced_choice(options, &physics, rigid) {
+        let choice = match SchemeChoice::forced_choice(options, &physics, obstacle) {
             Some(choice) => choice,
             None => {
                 let explicit = &begun
@@ -156,12 +156,12 @@ impl Simulation {
             }
         };
         if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
-            return Err(SimulationError::Held { rigid });
+            return Err(SimulationError::Held { obstacle });
         }
         if choice.scheme == Scheme::SemiImplicit
             && let Some(at) = physics.unresolved_pulse_time()
         {
-            return Err(SimulationError::Pulse { at, rigid });
+            return Err(SimulationError::Pulse { at, obstacle });
         }
         let mut step = options.step;
         let mut stable = None;
@@ -465,8 +465,13 @@ fn explicit_motion(
     step: Option<f64>,
 ) -> Result<ExplicitMotion, SimulationError> {
     let own = step.map(|step| step / physics.time_unit);
-    let method = Explicit::new(leaf.clone(), physics.clone(), state, own)
-        .map_err(|RigidRodError| SimulationError::Rigid)?;
+    let method =
+        Explicit::new(leaf.clone(), physics.clone(), state, own).map_err(
+            |obstacle| match obstacle {
+                ExplicitRefusal::RigidRod => SimulationError::Rigid,
+                ExplicitRefusal::MassOffAxis => SimulationError::MassOffAxis,
+            },
+        )?;
     let bound = method.stable_step();
     let stable = bound.step * physics.time_unit;
     match step {

@@ -1,5 +1,6 @@
 //! What is asked of a simulation: its options, and the errors of requests that cannot be met.
 
+use crate::motion::ExplicitRefusal;
 use crate::run::{Limit, RefusedOption};
 use crate::{relax, words};
 
@@ -53,26 +54,39 @@ pub enum SimulationError {
          use the semi-implicit method, or give a number"
     )]
     Rigid,
+    /// The explicit method does not move masses off the axis.
+    #[error(
+        "load.point.offset: the explicit method does not move masses off the axis: use the semi-implicit method, or \
+         leave the offset out"
+    )]
+    MassOffAxis,
     /// The base is free, and the semi-implicit method clamps it.
     #[error(
         "dynamics.clamped = false: the semi-implicit method holds the base: use the explicit method{}",
-        if *.rigid { ", and a number for every stiffness that is inf" } else { "" }
+        match .obstacle {
+            None => "",
+            Some(ExplicitRefusal::RigidRod) => ", and a number for every stiffness that is inf",
+            Some(ExplicitRefusal::MassOffAxis) => ", and no load.point.offset of a mass",
+        }
     )]
     Held {
-        /// Whether a rod is rigid, which the explicit method cannot move.
-        rigid: bool,
+        /// What the explicit method cannot move.
+        obstacle: Option<ExplicitRefusal>,
     },
     /// A load has a pulse that the semi-implicit method does not resolve.
     #[error(
         "a load in time has a pulse at {at} that is shorter than a millionth of the unit of time \
          sqrt(rho L^4/A): make it longer with the same impulse{}",
-        if *.rigid { "" } else { ", or use the explicit method" }
+        match .obstacle {
+            Some(_) => "",
+            None => ", or use the explicit method",
+        }
     )]
     Pulse {
         /// Its time.
         at: f64,
-        /// Whether a rod is rigid, which the explicit method cannot move.
-        rigid: bool,
+        /// What the explicit method cannot move.
+        obstacle: Option<ExplicitRefusal>,
     },
     /// An option has a value that it cannot have, such as a time step that is too long for the
     /// explicit method.

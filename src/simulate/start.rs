@@ -186,6 +186,11 @@ pub(super) fn mode_deviation(
         );
         along += rotation_part(mode).dot(tensor * rotation_part(off))
             + inertia.mass * displacement_part(mode).dot(displacement_part(off));
+        if inertia.is_off_axis() {
+            let s = inertia.first_moment(from.q[k]);
+            along += rotation_part(mode).dot(s.cross(displacement_part(off)))
+                + displacement_part(mode).dot(rotation_part(off).cross(s));
+        }
         largest = largest
             .max(rotation_part(mode).length())
             .max(displacement_part(mode).length());

@@ -38,6 +38,7 @@ fn loaded(
         force,
         moment,
         mass: 0.0,
+        offset: [0.0; 2],
         in_time: Some(Box::new(VaryingPointLoad {
             factor: factor.clone(),
             force,

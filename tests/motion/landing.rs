@@ -14,6 +14,7 @@ fn land(scenario: &mut Scenario, (vein, at): (usize, f64), landing: Landing) {
         force: [0.0; 3],
         moment: [0.0; 3],
         mass: 0.0,
+        offset: [0.0; 2],
         in_time: None,
         landing: Some(landing),
     });

@@ -13,6 +13,7 @@ mod hinges;
 mod landing;
 mod moments;
 mod momentum;
+mod off_axis;
 mod order;
 mod pulses;
 mod released_rigid;

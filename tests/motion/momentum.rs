@@ -7,7 +7,7 @@
 
 use leafdyn::internals::leaf::DiscreteLeaf;
 use leafdyn::internals::motion::{Physics, Snapshot, TimeIntegrator};
-use leafdyn::simulate::{self, Simulation, SimulationError};
+use leafdyn::simulate::{self, ExplicitRefusal, Simulation, SimulationError};
 use leafdyn_testing::motion::{Scheme, discrete, explicit, moving, released};
 use leafdyn_testing::*;
 
@@ -180,12 +180,14 @@ fn the_semi_implicit_method_does_not_fly() {
     };
     let default = simulate::Options::default();
     assert_eq!(of(&scenario, &default), Ok(Scheme::Explicit));
-    let held = Err(SimulationError::Held { rigid: false });
+    let held = Err(SimulationError::Held { obstacle: None });
     assert_eq!(of(&scenario, &moving(Scheme::SemiImplicit, None)), held);
     let mut rigid = scenario.clone();
     rigid.rods[0].force_stiffness[0] = Profile::Constant(f64::INFINITY);
     assert_eq!(
         of(&rigid, &default),
-        Err(SimulationError::Held { rigid: true })
+        Err(SimulationError::Held {
+            obstacle: Some(ExplicitRefusal::RigidRod)
+        })
     );
 }

@@ -141,6 +141,7 @@ fn random_leaves_are_confirmed() {
                 moment: vector(50).map(|value| 0.3 * value),
                 follows: true,
                 mass: 0.0,
+                offset: [0.0; 2],
                 in_time: None,
                 landing: None,
             });

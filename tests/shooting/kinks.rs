@@ -270,6 +270,7 @@ fn stations_a_rounding_error_from_a_point_that_is_loaded() {
             moment: [0.4, -0.5, 0.6],
             follows: false,
             mass: 0.0,
+            offset: [0.0; 2],
             in_time: None,
             landing: None,
         }];

@@ -4,6 +4,7 @@ mod agrees;
 mod error;
 mod followers;
 mod kinks;
+mod off_axis;
 mod rigid_tissue;
 mod singular;
 mod soft;

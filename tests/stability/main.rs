@@ -15,6 +15,7 @@ mod margin_of_grips;
 mod margin_random;
 mod mode_shapes;
 mod modes;
+mod off_axis;
 mod point_masses;
 mod rollers;
 mod small_motions;

@@ -36,6 +36,7 @@ fn moment_at(at: f64, entries: &str) -> Scenario {
         moment: [0.3, 0.8, -0.4],
         follows: false,
         mass: 0.0,
+        offset: [0.0; 2],
         in_time: None,
         landing: None,
     });

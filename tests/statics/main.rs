@@ -31,6 +31,7 @@ mod measured_leaves;
 mod moment_sensitivities;
 mod no_equilibrium;
 mod objectivity;
+mod off_axis;
 mod order;
 mod path;
 mod plates;

@@ -92,17 +92,17 @@ fn apart(draw: &mut Draw, number: usize, rods: usize) -> Part {
         leaf.base = {base:?}
         leaf.elevation = {:?}
         load.g = [0.0, 0.1, -0.3]
-        load.point = [{{ vein = {rods}, at = 0.5, force = [0.1, -0.2, 0.3] }}, {{ vein = 1, at = 1.0, force = [0.0, 0.1, 0.0], mass = 0.2 }}]
+        load.point = [{{ vein = {rods}, at = 0.5, force = [0.1, -0.2, 0.3], offset = [0.1, -0.15] }}, {{ vein = 1, at = 1.0, force = [0.0, 0.1, 0.0], mass = 0.2 }}]
         load.distributed = {{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.2], [0.1, 0.0, 0.0]] }}
         "#,
         draw.list(rods, -0.3, 0.3),
     );
     let keys = match rods {
         1 => {
-            "leaf.base[0][1] leaf.elevation[0] load.g[2] load.point[0].force[0] load.point[1].mass"
+            "leaf.base[0][1] leaf.elevation[0] load.g[2] load.point[0].force[0] load.point[0].offset[1] load.point[1].mass"
         }
         _ => {
-            "leaf.base[1][1] leaf.base[0][2] leaf.elevation[0] load.g[2] load.point[0].force[2] \
+            "leaf.base[1][1] leaf.base[0][2] leaf.elevation[0] load.g[2] load.point[0].force[2] load.point[0].offset[0] \
              tissue.along tissue.across[0] tissue.normal tissue.fold"
         }
     };

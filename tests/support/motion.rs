@@ -46,6 +46,7 @@ pub fn moments_on_points() -> Scenario {
         moment,
         follows: false,
         mass: 0.0,
+        offset: [0.0; 2],
         in_time: None,
         landing: None,
     };

@@ -111,6 +111,7 @@ impl Pull {
             moment: [0.0; 3],
             follows: false,
             mass: 0.0,
+            offset: [0.0; 2],
             in_time: None,
             landing: None,
         });

@@ -374,6 +374,7 @@ mod tests {
                 moment: [0.0; 3],
                 follows: false,
                 mass: 0.0,
+                offset: [0.0; 2],
                 in_time: None,
                 landing: None,
             }];
@@ -415,6 +416,7 @@ mod tests {
                     moment: [0.0; 3],
                     follows,
                     mass: 0.0,
+                    offset: [0.0; 2],
                     in_time: None,
                     landing: None,
                 }];
@@ -423,6 +425,22 @@ mod tests {
         let drawn = loaded(own, true);
         assert!(drawn.contains(">force 0.5385<"));
         assert_eq!(drawn, loaded(turn * own, false));
+        // Off the axis it begins beside it.
+        let beside = svg(|it| {
+            it.points = vec![PointLoad {
+                vein: 0,
+                at: rod.shape.stations[4],
+                force: own.to_array(),
+                moment: [0.0; 3],
+                follows: true,
+                mass: 0.0,
+                offset: [0.0, 0.1],
+                in_time: None,
+                landing: None,
+            }];
+        });
+        assert!(beside.contains(">force 0.5385<"));
+        assert_ne!(beside, drawn);
         let along = svg(|it| {
             it.follower = Some(vec![
                 [0.0, 0.0, 0.3].map(leafdyn::scenario::Profile::Constant),

@@ -6,7 +6,7 @@
 
 use crate::report::numbers::format_four_digits;
 use ListEntryOwner::*;
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{BaseSupport, Grip, Key, Profile, Scenario, Schedule, SupportKind, Units};
 use serde::Serialize;
@@ -79,6 +79,9 @@ pub struct LoadMark {
     pub vein: usize,
     /// Fraction of the length of the vein.
     pub at: f64,
+    /// Where a force acts off the axis, lengths along d2 and d3.
+    #[serde(skip_serializing_if = "is_on_axis")]
+    pub offset: [f64; 2],
     /// Unit vector of a force, or about which a moment turns.
     pub direction: DVec3,
     /// In the scenario's units.
@@ -135,18 +138,27 @@ pub struct SupportMark {
     pub held: SupportForm,
 }
 
+fn is_on_axis(offset: &[f64; 2]) -> bool {
+    *offset == [0.0; 2]
+}
+
+/// The rotation of a section of a leaf at rest.
+pub fn section_rotation(leaf: &Equilibrium, vein: usize, sigma: f64) -> Option<DQuat> {
+    let after = leaf.shape.stations.partition_point(|&at| at < sigma);
+    let nodes = &leaf.shape.rods.get(vein)?.nodes;
+    let node = nodes.get(after).or(nodes.last())?;
+    Some(node.rotation)
+}
+
 /// A scenario in which loads that turn with the section are dead ones: as they act on this leaf at rest.
 pub fn with_followers_as_dead<'s>(scenario: &'s Scenario, leaf: &Equilibrium) -> Cow<'s, Scenario> {
     if !scenario.has_followers() {
         return Cow::Borrowed(scenario);
     }
-    let stations = &leaf.shape.stations;
     let turned = |vein: usize, sigma: f64, load: [f64; 3]| -> [f64; 3] {
-        let after = stations.partition_point(|&at| at < sigma);
-        let nodes = leaf.shape.rods.get(vein).map(|rod| &rod.nodes);
-        let node = nodes.and_then(|nodes| nodes.get(after).or(nodes.last()));
         let load = DVec3::from_array(load);
-        node.map_or(load, |node| node.rotation * load).to_array()
+        let rotation = section_rotation(leaf, vein, sigma);
+        rotation.map_or(load, |rotation| rotation * load).to_array()
     };
     let mut dead = scenario.clone();
     for point in dead.points.iter_mut().filter(|it| it.follows) {
@@ -204,22 +216,23 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
         } else {
             DVec3::from_array(it.force)
         };
-        (it.vein + 1, it.at, given + it.mass * g)
+        (it.vein + 1, it.at, it.offset, given + it.mass * g)
     });
     // Tips at one point have one arrow.
     let tips = if scenario.joined { 1 } else { veins };
-    let on_tips = (1..=tips).map(|vein| (vein, 1.0, tip_force));
+    let axis = [0.0; 2];
+    let on_tips = (1..=tips).map(|vein| (vein, 1.0, axis, tip_force));
     let single: Vec<_> = on_points.chain(on_tips).collect();
     let moments = points.filter(|it| !it.follows);
-    let moments = moments.map(|it| (it.vein + 1, it.at, DVec3::from_array(it.moment)));
-    let moments: Vec<_> = moments.chain([(1, 1.0, tip_moment)]).collect();
+    let moments = moments.map(|it| (it.vein + 1, it.at, axis, DVec3::from_array(it.moment)));
+    let moments: Vec<_> = moments.chain([(1, 1.0, axis, tip_moment)]).collect();
     let along = |load: Option<&Vec<[Profile; 3]>>, places: Vec<f64>| -> Vec<_> {
         let of = |vein: usize, s: f64| {
             load.map(|all| DVec3::from_array(all[vein].each_ref().map(|profile| profile.at(s))))
         };
         let loaded = LOAD_ARROWS.loaded_veins(veins);
         let places = loaded.flat_map(|vein| places.iter().map(move |&s| (vein, s)));
-        let marks = places.filter_map(|(vein, s)| Some((vein + 1, s, of(vein, s)?)));
+        let marks = places.filter_map(|(vein, s)| Some((vein + 1, s, axis, of(vein, s)?)));
         marks.collect()
     };
     let couple = (scenario.couple.as_ref()).filter(|_| !scenario.couple_follows);
@@ -254,16 +267,19 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
         .flat_map(|(action, loads, longest, shortest)| {
             let largest = loads.iter().map(|(.., load)| load.length());
             let largest = largest.fold(0.0, f64::max);
-            loads.into_iter().filter_map(move |(vein, at, load)| {
-                Some(LoadMark {
-                    action,
-                    vein,
-                    at,
-                    direction: load.try_normalize()?,
-                    size: load.length(),
-                    length: longest * (load.length() / largest).max(shortest),
+            loads
+                .into_iter()
+                .filter_map(move |(vein, at, offset, load)| {
+                    Some(LoadMark {
+                        action,
+                        vein,
+                        at,
+                        offset,
+                        direction: load.try_normalize()?,
+                        size: load.length(),
+                        length: longest * (load.length() / largest).max(shortest),
+                    })
                 })
-            })
         });
     marks.collect()
 }

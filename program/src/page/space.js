@@ -292,9 +292,10 @@ function curved(thick) {
 }
 
 /// Where the arrow of a load begins: one along a vein, or that pushes against it, ends at its point.
-function tailOf({ action, vein, at, direction, length }, leaf, mesh) {
+function tailOf({ action, vein, at, offset, direction, length }, leaf, mesh) {
   const place = placeOf(vein, at, leaf, mesh);
-  const point = [...mesh.points.subarray(place, place + 3)];
+  const arm = offset && leaf.state ? armOf(offset, vein, at, leaf) : [0, 0, 0];
+  const point = [...mesh.points.subarray(place, place + 3)].map((x, k) => x + arm[k]);
   if (turns(action)) return point;
   const first = placeOf(vein, 0, leaf, mesh);
   const before = Math.max(first, place - 3);
@@ -302,6 +303,18 @@ function tailOf({ action, vein, at, direction, length }, leaf, mesh) {
   const along = direction.reduce((sum, x, k) => sum + x * tangent[k], 0);
   const ends = action === "distributed" || along < -0.5 * hypot(...tangent);
   return ends ? point.map((x, k) => x - length * view.longest * direction[k]) : point;
+}
+
+/// From the axis to the point of a load off it: y d2 + z d3.
+function armOf([y, z], vein, at, { state, stations, nodes }) {
+  const after = stations.findIndex((station) => station >= at - 1e-9);
+  const node = view.drawn.indexOf(vein) * nodes + (after < 0 ? nodes - 1 : after);
+  const [w, a, b, c] = state.subarray(16 * node, 16 * node + 4);
+  return [
+    2 * (a * b - w * c) * y + 2 * (a * c + w * b) * z,
+    (1 - 2 * (a * a + c * c)) * y + 2 * (b * c - w * a) * z,
+    2 * (b * c + w * a) * y + (1 - 2 * (a * a + b * b)) * z,
+  ];
 }
 
 const paintMark = (mark) => mark.children.forEach((part) => part.material.color.set(css("--bad")));

@@ -118,6 +118,7 @@ LoadPointTable = TypedDict(
         "from": float,
         "mass": float,
         "moment": Numbers,
+        "offset": Numbers,
         "vein": SupportsIndex,
         "velocity": Numbers,
     },

@@ -385,6 +385,7 @@ impl DiscreteLeaf {
             return;
         }
         self.add_own_load_changes(state, each, forces);
+        self.add_lever_changes(state, each, forces);
         self.add_spring_changes(state, each, forces);
         let terms: Vec<_> = each.iter().map(|it| (it.weight, &it.term)).collect();
         forces.energy += self.for_each_tissue_change(state, &terms, |j, i, load| {
@@ -393,6 +394,28 @@ impl DiscreteLeaf {
                 add_to_increment(on, load.moment, load.force);
             }
         });
+    }
+
+    /// Adds the changes of dead forces off the axes and of where they act.
+    fn add_lever_changes(
+        &self,
+        state: &State,
+        each: &[Weighted<DiscreteLeaf>],
+        forces: &mut ParameterForces,
+    ) {
+        let nodes = self.moving_nodes();
+        for Weighted { weight, term } in each {
+            let factor = self.load_factor * *weight;
+            for lever in term.present_levers() {
+                let q = state.q[state.base(lever.rod) + lever.node];
+                forces.energy += factor * lever.energy(q);
+                if nodes.contains(&lever.node) {
+                    let on_rod = forces.rod_forces_mut(lever.rod, nodes.len());
+                    let on = &mut on_rod[lever.node - nodes.start];
+                    add_to_increment(on, factor * lever.moment(q), DVec3::ZERO);
+                }
+            }
+        }
     }
 
     /// Adds the changes of the springs of supports, in their stiffness and in where they have no force.

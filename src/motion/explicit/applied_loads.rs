@@ -123,6 +123,7 @@ impl AppliedLoads {
         self.nodes.fill(Wrench::default());
         leaf.add_tissue_loads(&self.state, &mut self.nodes);
         leaf.add_own_forces(&mut self.nodes);
+        leaf.add_lever_moments(&self.state, &mut self.nodes);
         leaf.add_spring_loads(&self.state, &mut self.nodes);
         if let Some(blown) = &mut self.nodes_in_wind {
             let (now, earlier) = (&blown.velocity, &blown.earlier_velocity);

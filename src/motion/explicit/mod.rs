@@ -30,17 +30,19 @@
 mod applied_loads;
 mod kernel;
 mod layout;
+mod moment_work;
 mod packs;
 mod stable_step;
 mod supports;
 #[cfg(test)]
 mod tests;
 
-use crate::leaf::{DiscreteLeaf, Loads, NodalMoment, State};
+use crate::leaf::{DiscreteLeaf, Loads, State};
 use crate::motion::explicit::applied_loads::{AppliedLoads, KickAir};
 use crate::motion::explicit::kernel::{BlockForces, PackForces, PackStep, StepLaw};
 use crate::motion::explicit::layout::{AlignedArray, PackLayout, PackPosition, vector_at};
-use crate::motion::explicit::packs::{NodeMomentum, NodeSpin, Pack, SlidingNode};
+use crate::motion::explicit::moment_work::{LeverWork, StepDeadMoments};
+use crate::motion::explicit::packs::{NodeMomentum, Pack, SlidingNode};
 pub use crate::motion::explicit::stable_step::StableStep;
 use crate::motion::moving_supports::{MovingNode, MovingSupports};
 use crate::motion::physics::Physics;
@@ -103,6 +105,7 @@ pub struct Explicit {
     supports: Option<MovingSupports>,
     /// The dead moments of a step.
     moments: StepDeadMoments,
+    lever_work: LeverWork,
     /// Nodes that grips hold along some axes and let slide along the others.
     sliding: Vec<SlidingNode>,
     /// Mass of the shared tip, if there is one.
@@ -154,24 +157,39 @@ struct KickEnergy {
     twice_kinetic: f64,
 }
 
-/// A rigid rod, whose stiffness the method cannot handle.
+/// What the method cannot move.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RigidRodError;
+pub enum ExplicitRefusal {
+    /// A rigid rod: its waves are infinitely fast.
+    RigidRod,
+    /// A mass off the axis, with which the rotation of a node does not go on freely between kicks.
+    MassOffAxis,
+}
+
+impl ExplicitRefusal {
+    /// What the method cannot move of a leaf, if there is something.
+    pub fn of_leaf(leaf: &DiscreteLeaf, physics: &Physics) -> Option<Self> {
+        if leaf.least_compliance() == 0.0 {
+            return Some(ExplicitRefusal::RigidRod);
+        }
+        (physics.has_masses_off_axis()).then_some(ExplicitRefusal::MassOffAxis)
+    }
+}
 
 impl Explicit {
     /// A leaf at rest in `state`. Rigid tissue is made stiff. Time steps are nine tenths of the stable one,
     /// or `step` if that is given, stable or not.
     ///
     /// # Errors
-    /// If a rod is rigid: its waves are infinitely fast.
+    /// If a rod is rigid, or a mass is off the axis.
     pub fn new(
         leaf: DiscreteLeaf,
         physics: Physics,
         state: &State,
         step: Option<f64>,
-    ) -> Result<Self, RigidRodError> {
-        if leaf.least_compliance() == 0.0 {
-            return Err(RigidRodError);
+    ) -> Result<Self, ExplicitRefusal> {
+        if let Some(refusal) = ExplicitRefusal::of_leaf(&leaf, &physics) {
+            return Err(refusal);
         }
         let leaf = leaf.with_elastic_tissue();
         let (count, joined, last) = (leaf.rods(), leaf.tips_move_together(), leaf.segments());
@@ -188,6 +206,7 @@ impl Explicit {
             applied: AppliedLoads::new(&leaf, &physics, state, layout),
             supports: MovingSupports::new(&leaf, &physics),
             moments: StepDeadMoments::default(),
+            lever_work: LeverWork::default(),
             block: BlockForces::new(),
             sliding: packs::sliding_nodes(&leaf, state, layout),
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
@@ -332,6 +351,11 @@ impl Explicit {
             self.layout,
             &self.packs,
         );
+        self.lever_work.begin_step(
+            self.physics.scheduled_lever_excess(&self.leaf),
+            self.layout,
+            &self.packs,
+        );
         if let Some(applied) = &mut self.applied {
             let [last, before] = self.past.widths;
             let air = KickAir {
@@ -387,6 +411,7 @@ impl Explicit {
             work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity, free);
         }
         work += length * self.moments.power(self.layout, &self.packs);
+        work += length * self.lever_work.power(&self.packs);
         if self.physics.rest_curvature_varies() {
             work += self.work.rest_curvature_work(rest, bent, length, self.past);
         }
@@ -732,48 +757,6 @@ impl Explicit {
     }
 }
 
-/// The dead moments on a single rod in a step.
-#[derive(Default)]
-struct StepDeadMoments {
-    nodal_moments: Vec<NodalMoment>,
-    /// Motions of these nodes before the step.
-    spins_before: Vec<NodeSpin>,
-}
-
-impl StepDeadMoments {
-    /// Takes over the moments of a step that begins.
-    fn begin_step(
-        &mut self,
-        moments: impl Iterator<Item = NodalMoment>,
-        layout: PackLayout,
-        packs: &[Pack],
-    ) {
-        self.nodal_moments.clear();
-        self.nodal_moments.extend(moments);
-        let spins = self.nodal_moments.iter().map(|it| {
-            let PackPosition { pack, entry } = layout.pack_position(0, it.node);
-            NodeSpin {
-                rotation: packs[pack].rotation(entry),
-                angular_momentum: packs[pack].momentum(entry).angular,
-            }
-        });
-        self.spins_before.clear();
-        self.spins_before.extend(spins);
-    }
-
-    /// Power of the moments at the mean of the angular momenta before the step and of the present ones.
-    fn power(&self, layout: PackLayout, packs: &[Pack]) -> f64 {
-        let nodes = self.nodal_moments.iter().zip(&self.spins_before);
-        let power = nodes.map(|(NodalMoment { node, moment }, before)| {
-            let PackPosition { pack, entry } = layout.pack_position(0, *node);
-            let pack = &packs[pack];
-            let momentum = 0.5 * (before.angular_momentum + pack.momentum(entry).angular);
-            moment.dot(pack.angular_velocity(entry, before.rotation, momentum))
-        });
-        power.sum()
-    }
-}
-
 /// What the work of varying loads and rest curvatures depends on.
 #[derive(Clone, Copy, Debug)]
 struct VaryingWork {
@@ -846,6 +829,9 @@ impl Explicit {
             work -= self.excess_load_sum(&loads, |j, i| {
                 vector_at(&self.positions, self.layout.node_index(j, i))
             });
+            let levers = self.physics.scheduled_lever_excess(&self.leaf);
+            let energy = levers.map(|it| it.energy(self.rotation(it.rod, it.node)));
+            work += energy.sum::<f64>();
         }
         if self.physics.rest_curvature_varies() {
             let VaryingWork {

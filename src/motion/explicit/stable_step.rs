@@ -71,7 +71,14 @@ impl StableStep {
         if springs > strains.max(coupling).max(tissue) {
             limit = "the springs of supports";
         }
-        let coupling = coupling + tissue + springs;
+        let levers = leaf.lever_frequency_bound(|j, i| {
+            let inertia = physics.inertia(leaf, j, i);
+            inertia.transverse.min(inertia.polar())
+        });
+        if levers > strains.max(coupling).max(tissue).max(springs) {
+            limit = "the levers of loads off the axis";
+        }
+        let coupling = coupling + tissue + springs + levers;
         let all = strains + coupling;
         let friction = physics.retardation * strains;
         let drag =

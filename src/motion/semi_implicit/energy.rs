@@ -105,6 +105,15 @@ impl SemiImplicit {
             if !MovingSupports::holds(&self.supports, k, 1) {
                 sum += inertia.mass * shift.dot(mean(1));
             }
+            if inertia.is_off_axis() {
+                let s = inertia.first_moment(self.state.q[k]);
+                if !MovingSupports::holds(&self.supports, k, 0) {
+                    sum += turn.dot(s.cross(mean(1)));
+                }
+                if !MovingSupports::holds(&self.supports, k, 1) {
+                    sum += shift.dot(mean(0).cross(s));
+                }
+            }
         }
         sum
     }

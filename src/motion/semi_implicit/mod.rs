@@ -20,6 +20,7 @@
 //! rigid segments are strained, as those of arcs with different chords, positions without such strains.
 
 mod energy;
+mod off_axis;
 mod start;
 
 use crate::leaf::{DiagonalBlocks, DiscreteLeaf, Loads, NodalMoment, State, System};
@@ -463,20 +464,32 @@ impl SemiImplicit {
             self.add_follower_forces(self.clock.time + h, w.gamma / (w.beta * h));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
             let supports = &self.supports;
+            let (leaf, trial, nodes) = (&self.leaf, &self.trial, self.leaf.segments() + 1);
             let inertial = |k: usize, tensor: &DMat3| {
                 let m = &moving[k];
                 let momentum = *tensor * m.v[0];
                 let moment = *tensor * m.w[0] + m.v[0].cross(momentum) + damping * momentum;
-                free_wrench(
-                    supports,
-                    k,
-                    Wrench {
-                        moment: -moment,
-                        force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
-                    },
-                )
+                let mut load = Wrench {
+                    moment: -moment,
+                    force: -inertia[k].mass * (m.w[1] + damping * m.v[1]),
+                };
+                if inertia[k].is_off_axis() {
+                    let s = inertia[k].first_moment(trial.q[k]);
+                    load.moment -= s.cross(m.w[1] + damping * m.v[1]);
+                    load.force -=
+                        m.w[0].cross(s) + m.v[0].cross(m.v[0].cross(s)) + damping * m.v[0].cross(s);
+                    load = leaf.node_freedom(k / nodes, k % nodes).of_wrench(load);
+                }
+                free_wrench(supports, k, load)
             };
-            add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
+            add_inertia(
+                &self.leaf,
+                &mut self.system,
+                trial,
+                inertia,
+                per_mass,
+                inertial,
+            );
             if !self.solve() {
                 return None;
             }
@@ -554,8 +567,12 @@ impl SemiImplicit {
         if change != Loads::default() {
             self.add_load_accelerations(change);
         }
-        if self.factor_changes.iter().any(|change| *change != 0.0) {
+        let scheduled = self.factor_changes.iter().any(|change| *change != 0.0);
+        if scheduled {
             self.add_scheduled_accelerations();
+        }
+        if scheduled || change != Loads::default() {
+            self.add_off_axis_accelerations(change);
         }
     }
 
@@ -576,14 +593,27 @@ impl SemiImplicit {
             let mass: f64 = { nodes.clone() }
                 .map(|j| self.inertia[self.state.base(j) + it.node].mass)
                 .sum();
+            if self.is_off_axis_body(self.state.base(it.rod) + it.node) {
+                continue;
+            }
             for j in nodes {
                 let free = self.leaf.node_freedom(j, it.node);
                 let linear = free.of_displacement(change / mass);
                 self.node_motions[self.state.base(j) + it.node].a[1] += linear;
             }
         }
+        for (number, lever) in &scheduled.levers {
+            let k = self.state.base(lever.rod) + lever.node;
+            let free = self.leaf.node_freedom(lever.rod, lever.node);
+            if free.rotation && !self.is_off_axis_body(k) {
+                let tensor = self.inertia[k].tensor(self.state.q[k]);
+                let change = self.factor_changes[*number] * lever.moment(self.state.q[k]);
+                self.node_motions[k].a[0] += tensor.inverse() * change;
+            }
+        }
         for (number, NodalMoment { node, moment }) in &scheduled.moments {
-            if self.leaf.node_freedom(0, *node).rotation {
+            let free = self.leaf.node_freedom(0, *node);
+            if free.rotation && !self.is_off_axis_body(*node) {
                 let tensor = self.inertia[*node].tensor(self.state.q[*node]);
                 let change = self.factor_changes[*number] * *moment;
                 self.node_motions[*node].a[0] += tensor.inverse() * change;
@@ -608,6 +638,9 @@ impl SemiImplicit {
         let together = self.leaf.tips_move_together();
         for (j, i) in self.leaf.rod_index_pairs(1..=n) {
             let k = self.state.base(j) + i;
+            if self.is_off_axis_body(k) {
+                continue;
+            }
             let free = self.leaf.node_freedom(j, i);
             let mass = self.inertia[k].mass;
             let linear = match i == n {
@@ -618,7 +651,7 @@ impl SemiImplicit {
             self.node_motions[k].a[1] += free.of_displacement(linear);
         }
         for NodalMoment { node, moment } in self.leaf.dead_moments_under(loads) {
-            if self.leaf.node_freedom(0, node).rotation {
+            if self.leaf.node_freedom(0, node).rotation && !self.is_off_axis_body(node) {
                 let tensor = self.inertia[node].tensor(self.state.q[node]);
                 self.node_motions[node].a[0] += tensor.inverse() * moment;
             }
@@ -688,6 +721,7 @@ fn free_wrench(supports: &Option<MovingSupports>, k: usize, on_node: Wrench) -> 
 /// Adds mass times `per_mass` to the matrix, and a moment and a force to the
 /// right-hand side, at all nodes with equations.
 fn add_inertia(
+    leaf: &DiscreteLeaf,
     system: &mut System,
     state: &State,
     inertia: &[Inertia],
@@ -704,6 +738,9 @@ fn add_inertia(
                 translational: inertia[k].mass * per_mass,
             };
             system.add_to_node(j, i, stiffness, load(k, &tensor));
+            if let Some(coupling) = inertia[k].coupling(state.q[k], || leaf.node_freedom(j, i)) {
+                system.add_rotation_displacement_coupling(j, i, per_mass * coupling);
+            }
         }
     }
 }

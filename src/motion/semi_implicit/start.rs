@@ -104,13 +104,28 @@ impl SemiImplicit {
             };
             let increments: Vec<_> = (0..self.state.x.len()).map(excess).collect();
             let (inertia, supports) = (&self.inertia, &self.supports);
+            let (leaf, trial, nodes) = (&self.leaf, &self.trial, self.leaf.segments() + 1);
             let inertial = |k: usize, tensor: &DMat3| {
                 let [turn, shift] = increments[k];
                 let moment = -per_mass * (*tensor * turn);
                 let force = -per_mass * inertia[k].mass * shift;
-                free_wrench(supports, k, Wrench { moment, force })
+                let mut load = Wrench { moment, force };
+                if inertia[k].is_off_axis() {
+                    let s = inertia[k].first_moment(trial.q[k]);
+                    load.moment -= per_mass * s.cross(shift);
+                    load.force -= per_mass * turn.cross(s);
+                    load = leaf.node_freedom(k / nodes, k % nodes).of_wrench(load);
+                }
+                free_wrench(supports, k, load)
             };
-            add_inertia(&mut self.system, &self.trial, inertia, per_mass, inertial);
+            add_inertia(
+                &self.leaf,
+                &mut self.system,
+                trial,
+                inertia,
+                per_mass,
+                inertial,
+            );
             if !self.solve() {
                 return false;
             }
@@ -153,6 +168,7 @@ impl SemiImplicit {
                 motion.a[1] = motion.w[1];
             }
         }
+        self.set_off_axis_accelerations();
         set_support_motions(&self.supports, &mut self.node_motions);
     }
 }
@@ -183,10 +199,15 @@ impl SemiImplicit {
         let potential = self.leaf.potential(&self.state);
         self.physics.land_next_mass();
         self.inertia[own] = self.physics.inertia(&self.leaf, j, i);
-        for &k in &nodes {
-            self.node_motions[k].v[1] = collision.common_velocity();
-        }
-        let mut exchange = collision.exchange();
+        let mut exchange = match self.is_off_axis_body(own) {
+            true => self.land_off_axis(own, &landing),
+            false => {
+                for &k in &nodes {
+                    self.node_motions[k].v[1] = collision.common_velocity();
+                }
+                collision.exchange()
+            }
+        };
         if let Some(supports) = &mut self.supports {
             supports.add_mass(own, landing.mass);
         }
@@ -216,7 +237,8 @@ impl SemiImplicit {
         let energy = |((inertia, motion), q): ((&Inertia, &NodeMotion), &DQuat)| {
             let [angular, linear] = motion.v;
             let turning = angular.dot(inertia.tensor(*q) * angular);
-            0.5 * (inertia.mass * linear.length_squared() + turning)
+            let coupled = inertia.first_moment(*q).dot(linear.cross(angular));
+            0.5 * (inertia.mass * linear.length_squared() + turning) + coupled
         };
         nodes.map(energy).sum()
     }

@@ -303,6 +303,11 @@ fn integrate_to_midpoints(
         let nodes = parts.sigma()[..n].iter().zip(known);
         let work = nodes.map(|(&sigma, node)| leaf.point_force_at(j, sigma).dot(node.x));
         energy -= work.sum::<f64>();
+        if leaf.has_levers() {
+            let nodes = parts.sigma().iter().zip(known);
+            let levers = nodes.map(|(&sigma, node)| leaf.lever_energy_at(j, sigma, node.q));
+            energy += levers.sum::<f64>();
+        }
     }
     MidpointIntegration {
         slices,
@@ -454,6 +459,9 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
         }
         if !clamped {
             tip.m = leaf.dead_moment_at(1.0);
+            if leaf.has_levers() {
+                tip.m += leaf.lever_moment_at(j, 1.0, tip.q);
+            }
         }
     }
 }

@@ -632,6 +632,10 @@ impl<'l> NodalResultants<'l> {
                     true => leaf.tip_force(j),
                     false => leaf.point_force_at(j, leaf.grid.sigma()[i]),
                 };
+                if leaf.has_levers() {
+                    let q = state.q[state.base(j) + i];
+                    moment -= leaf.lever_moment_at(j, leaf.grid.sigma()[i], q);
+                }
                 let part = left / (left + right);
                 let follower = leaf.follower_jump_before(state, j, i);
                 (

@@ -352,7 +352,10 @@ impl NestedEquilibrium {
             }
             if moments_error.is_none_or(|error| own_of_moments < SPURIOUS_DEFECT * error) {
                 moments = tips()
-                    .map(|tip| level.dead_moment_at(1.0) - tip.m)
+                    .enumerate()
+                    .map(|(j, tip)| {
+                        level.dead_moment_at(1.0) + level.lever_moment_at(j, 1.0, tip.q) - tip.m
+                    })
                     .collect();
                 moments_error = Some(own_of_moments);
             }

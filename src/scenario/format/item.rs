@@ -541,6 +541,17 @@ impl<'e> EntryValue<'e> {
         Ok(vector)
     }
 
+    /// A place in a section, along its directors d2 and d3.
+    pub fn place_in_section(&self) -> ScenarioResult<[f64; 2]> {
+        let needed = "a list of two numbers, along d2 and d3";
+        let mut place = [0.0; 2];
+        let components = self.list_of_length(2, "along the directors d2 and d3", needed)?;
+        for (component, item) in place.iter_mut().zip(components) {
+            *component = item.number()?;
+        }
+        Ok(place)
+    }
+
     /// A vector for each of `rods` rods: one for all, or a list.
     pub fn vector_per_rod(&self, rods: usize) -> ScenarioResult<Vec<[f64; 3]>> {
         if self.value.is_array() && self.value.get(0).is_some_and(|first| first.is_array()) {

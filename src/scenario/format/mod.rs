@@ -180,6 +180,8 @@ keys! {
     PointFollows "load.point.follows": Switch, [0, 0, 0], Default("false");
     /// mass of the point, which `load.g` pulls.
     PointMass "load.point.mass": Number(NotNegative), [-1, 1, 2], Default("0.0");
+    /// where the force and the mass are off the axis: along d2 and d3.
+    PointOffset "load.point.offset": AcrossSection, [1, 0, 0], Default("[0.0, 0.0]");
     /// time at which the mass lands on the leaf; before that it is absent.
     PointFrom "load.point.from": Number(NotNegative), [0, 0, 1], Default("0.0");
     /// velocity with which it lands.
@@ -460,6 +462,8 @@ pub(crate) enum ValueSchema {
     Stretch,
     /// A pixel of a photograph, to the right and down.
     Pixel,
+    /// A place in a section, along its directors d2 and d3.
+    AcrossSection,
     /// Base angles: a list, or a word.
     Fan,
     /// Vectors at given times.

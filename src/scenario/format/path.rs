@@ -121,6 +121,9 @@ impl EntryPath {
             ValueSchema::VectorPerRod if self.indices[1] > Some(2) => {
                 Err(COMPONENT_INDICES_HINT.into())
             }
+            ValueSchema::AcrossSection if index > Some(1) => {
+                Err("has the components 0 and 1, along d2 and d3".into())
+            }
             ValueSchema::Quantity(_) | ValueSchema::Outline(_) | ValueSchema::VectorQuantity(_) => {
                 Ok(())
             }
@@ -157,6 +160,7 @@ impl EntryPath {
             | ValueSchema::VectorOrInTime
             | ValueSchema::Fan
             | ValueSchema::Pixel
+            | ValueSchema::AcrossSection
                 if self.indices[0].is_none() =>
             {
                 list()

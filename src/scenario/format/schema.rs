@@ -94,7 +94,7 @@ fn entry_schema(key: Key) -> Value {
             let ends = json!({ "type": "array", "items": fraction_schema(), "minItems": 2, "maxItems": 2 });
             json!({ "anyOf": [fraction_schema(), ends] })
         }
-        ValueSchema::Pixel => {
+        ValueSchema::Pixel | ValueSchema::AcrossSection => {
             json!({ "type": "array", "items": number_schema(NumberRange::Finite), "minItems": 2, "maxItems": 2 })
         }
         ValueSchema::Fan => json!({ "anyOf": [

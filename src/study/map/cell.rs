@@ -10,7 +10,7 @@
 
 use crate::branch::value_at_fraction;
 use crate::leaf::{DiscreteLeaf, Grid, Leaf};
-use crate::motion::{Explicit, Physics, Stopped, TimeIntegrator};
+use crate::motion::{Explicit, ExplicitRefusal, Physics, Stopped, TimeIntegrator};
 use crate::numbers::{larger, largest};
 use crate::relax::{
     Method, Options, Outcome, RelaxError, SemiImplicit, SolverCounts, index_near, initial_state,
@@ -445,8 +445,10 @@ pub fn solve_by_explicit_motion(
     let discrete = DiscreteLeaf::new(&leaf, grid.clone());
     let state = initial_state(&discrete);
     let h = step / physics.time_unit;
-    let Ok(mut motion) = Explicit::new(discrete, physics.clone(), &state, Some(h)) else {
-        return refused(MapRemark::RigidRods);
+    let mut motion = match Explicit::new(discrete, physics.clone(), &state, Some(h)) {
+        Ok(motion) => motion,
+        Err(ExplicitRefusal::RigidRod) => return refused(MapRemark::RigidRods),
+        Err(ExplicitRefusal::MassOffAxis) => return refused(MapRemark::MassesOffAxis),
     };
     let stable = motion.stable_step();
     let stepped = SolutionRemark::Stepped {

@@ -55,6 +55,9 @@ remarks! {
         /// Rigid rods, for which no time step is stable.
         #[error("no time step is stable for rigid rods (a stiffness is inf)")]
         RigidRods = "rigid-rods",
+        /// Masses off the axis, which the explicit method does not move.
+        #[error("the explicit method does not move masses off the axis (load.point.offset)")]
+        MassesOffAxis = "masses-off-axis",
         /// A grid that takes longer than is allowed in any case.
         #[error("{nodes} nodes take longer than {seconds} s")]
         TooManyNodes {

@@ -176,6 +176,8 @@ const FORCE_ARROW: ForceArrowSizes = ForceArrowSizes {
 pub struct ForceArrow {
     /// From its tail to its head.
     pub ends: [DVec3; 2],
+    /// Of a force off the axis: from the axis to its point.
+    arm: Option<[DVec3; 2]>,
     head: [f64; 2],
     /// Empty of those along the vein.
     label: String,
@@ -184,21 +186,27 @@ pub struct ForceArrow {
 /// A point of a vein, with the unit tangent there.
 pub struct RodPoint {
     pub position: DVec3,
+    /// From the axis to the point.
+    pub arm: DVec3,
     pub tangent: DVec3,
 }
 
 /// The forces on a leaf whose largest extent is `extent`, of those that load it; `at` gives the point at a
-/// fraction of the length of a vein.
+/// fraction of the length of a vein, or off its axis there.
 pub fn force_arrows(
     marks: &[LoadMark],
     units: &Units,
     extent: f64,
-    at: impl Fn(usize, f64) -> Option<RodPoint>,
+    at: impl Fn(usize, f64, [f64; 2]) -> Option<RodPoint>,
 ) -> Vec<ForceArrow> {
     let unit = units.force.as_deref();
     let unit = unit.map_or(String::new(), |unit| format!(" {unit}"));
     let arrow = |mark: &LoadMark| {
-        let RodPoint { position, tangent } = at(mark.vein, mark.at)?;
+        let RodPoint {
+            position,
+            arm,
+            tangent,
+        } = at(mark.vein, mark.at, mark.offset)?;
         let along = mark.action == LoadKind::Distributed;
         // One that pushes against the rod ends at the point, any other begins there.
         let pushes = mark.direction.dot(tangent) < -0.5;
@@ -206,6 +214,7 @@ pub fn force_arrows(
         let reach = mark.length * extent * mark.direction;
         Some(ForceArrow {
             ends: [start, start + 1.0].map(|part| position + part * reach),
+            arm: (arm != DVec3::ZERO).then_some([position - arm, position]),
             head: if along {
                 FORCE_ARROW.small_head
             } else {
@@ -230,6 +239,9 @@ impl ForceArrow {
 
     /// Draws it without its label.
     pub fn draw(&self, page: &mut Drawing, place: impl Fn(DVec3) -> DVec2) {
+        if let Some([axis, point]) = self.arm.map(|ends| ends.map(&place)) {
+            page.draw_line(axis, point, Stroke::new(TEXT_COLOR, 1.0).with_dashes(true));
+        }
         let [tail, tip] = self.ends.map(place);
         let [length, half] = self.head;
         let along = (tip - tail).normalize_or_zero();

@@ -11,10 +11,10 @@ use crate::figure::drawing::{
     curve_between_fractions, is_drawable, polyline_path,
 };
 use crate::figure::scenario::{
-    FigureSetting, LoadMark, ParsedKey, SupportForm, load_marks, support_marks,
+    FigureSetting, LoadMark, ParsedKey, SupportForm, load_marks, section_rotation, support_marks,
     with_followers_as_dead,
 };
-use glam::{DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, RodShape};
 use leafdyn::scenario::Scenario;
 use leafdyn::simulate::{Record, ShapeSnapshot};
@@ -107,8 +107,8 @@ impl DrawnVeins {
         veins.with_supports(scenario).with_loads(
             scenario,
             &loads,
-            &shape.curve_stations,
-            &shape.curves,
+            (&shape.curve_stations, &shape.curves),
+            |vein, sigma| section_rotation(equilibrium, vein - 1, sigma),
         )
     }
 
@@ -144,19 +144,23 @@ impl DrawnVeins {
         let veins = DrawnVeins::from_curves(&still.curves, &tips, record.length);
         let time = record.moments.get(still.moment).map_or(0.0, |it| it.time);
         let loads = load_marks(scenario, Some(time));
-        veins
-            .with_supports(scenario)
-            .with_loads(scenario, &loads, &record.stations, &still.curves)
+        veins.with_supports(scenario).with_loads(
+            scenario,
+            &loads,
+            (&record.stations, &still.curves),
+            |_, _| None,
+        )
     }
 
     /// Adds what the grips of a scenario hold and where forces and moments act, on curves through nodes
-    /// at these stations.
+    /// at these stations. Loads off the axis are drawn there where the rotation of the section of a vein at a
+    /// fraction of its length is known.
     fn with_loads(
         mut self,
         scenario: &Scenario,
         loads: &[LoadMark],
-        stations: &[f64],
-        curves: &[Vec<DVec3>],
+        (stations, curves): (&[f64], &[Vec<DVec3>]),
+        rotation: impl Fn(usize, f64) -> Option<DQuat>,
     ) -> Self {
         let point = |vein: usize, sigma: f64| {
             let curve = curves.get(vein - 1)?;
@@ -168,11 +172,14 @@ impl DrawnVeins {
             loads,
             &scenario.units,
             self.largest_extent(),
-            |vein, sigma| {
+            |vein, sigma, [along_2, along_3]| {
                 let near = [(sigma - TANGENT_REACH).max(0.0), sigma.max(TANGENT_REACH)];
                 let [before, there] = near.map(|sigma| point(vein, sigma));
+                let own = DVec3::new(0.0, along_2, along_3) / self.unit;
+                let arm = rotation(vein, sigma).map_or(DVec3::ZERO, |turn| turn * own);
                 Some(RodPoint {
-                    position: point(vein, sigma)?,
+                    position: point(vein, sigma)? + arm,
+                    arm,
                     tangent: (there? - before?).normalize_or_zero(),
                 })
             },

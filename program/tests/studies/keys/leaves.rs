@@ -270,6 +270,30 @@ follows = true
         boundary: None,
     },
     TestLeaf {
+        name: "beside",
+        text: "
+leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }
+coupling = { x = 1.0, y = 2.0, z = 1.5 }
+[load]
+gravity = [0.0, 0.0, -0.6]
+g = [0.1, 0.1, -0.9]
+tip_force = [0.1, 0.2, -0.3]
+[[load.point]]
+vein = 1
+at = 0.5
+mass = 0.6
+offset = [0.1, 0.05]
+[[load.point]]
+vein = 2
+at = 1.0
+force = [0.1, 0.3, 0.4]
+offset = [0.0, 0.08]
+",
+        vary: PULLS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
         name: "windy",
         text: "
 leaf = { rods = 2, length = 1.0, fan = \"symmetric\" }

@@ -134,6 +134,22 @@ pub fn rows(key: Key) -> Vec<Row> {
             // Without a weight: what is left is its inertia.
             row("moving", "load.point[0].mass=0.4", Acts::Inertia, false),
         ],
+        Key::PointOffset => vec![
+            row("beside", "load.point[0].offset[1]=0.12", Acts::Always, true),
+            row(
+                "beside",
+                "load.point[1].offset=[0.05,0.0]",
+                Acts::Always,
+                false,
+            ),
+            // Without a weight: what is left is its inertia.
+            row(
+                "moving",
+                "load.point[0].offset=[0.3,0.1]",
+                Acts::Inertia,
+                false,
+            ),
+        ],
         Key::LoadFactor => vec![
             row(
                 "veins",
