@@ -7,7 +7,7 @@ use std::sync::Arc;
 use leafdyn::posture::points::PosturePoints;
 use leafdyn::scenario::{self, Scenario as Checked};
 use leafdyn::study::{
-    self, MeasuredColumn, SecondPosture, ShapeTableOptions, UnbendError, UnbendRemark,
+    self, MeasuredColumn, SecondPosture, ShapeFormat, ShapeTableOptions, UnbendError, UnbendRemark,
     UnbendRequest, Unbending, read_postures,
 };
 use leafdyn_program::files::{self, FileKind, ResultDocument};
@@ -138,12 +138,12 @@ pub fn unbend(
     second: Option<Points>,
     roll: f64,
     slow_loading: bool,
-    format: Option<&str>,
+    format: Option<String>,
     columns: Vec<String>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Posture> {
     let mut input = scenario.checked.clone();
-    let format = format.map(str::parse).transpose();
+    let format = format.as_deref().map(str::parse::<ShapeFormat>).transpose();
     let columns = columns
         .iter()
         .map(|column| column.parse::<MeasuredColumn>());

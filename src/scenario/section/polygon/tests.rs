@@ -172,7 +172,13 @@ fn torsion_of_triangles_with_closed_forms() {
 /// 2 pi/apex, that of the apex, where the stress function has a term of r^(pi/apex).
 #[test]
 fn torsion_of_triangles_by_finite_elements() {
-    for (width, height) in [(1.0, 0.2), (1.0, 0.5), (1.0, 1.3), (0.3, 1.0), (0.1, 1.0)] {
+    for (width, height) in [
+        (1.0_f64, 0.2),
+        (1.0, 0.5),
+        (1.0, 1.3),
+        (0.3, 1.0),
+        (0.2, 1.0),
+    ] {
         let apex = 2.0 * (width / (2.0 * height)).atan();
         let powers = [2.0, (2.0 * PI / apex).min(4.0), 4.0];
         let elements = TorsionMesh::extrapolated(&[triangle(width, height)], 12, powers);
