@@ -212,6 +212,7 @@ async function snaps() {
   await page.fill("#text", COLUMN);
   await page.click("#read");
   await page.waitForFunction(() => window.leafdyn.now.known.view.title === "column");
+  await page.evaluate(() => window.leafdyn.sliders.add("load.tip_force[2]"));
   const set = (value) => page.evaluate((value) => window.leafdyn.sliders.set("load.tip_force[2]", value, true), value);
   const z = async () => (await page.tip())[2];
   assert((await z()) > 0.3);
