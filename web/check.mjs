@@ -47,7 +47,7 @@ async function slides() {
   await page.waitForFunction((z) => window.leafdyn.now.known.tips[0][2] < z, before[2]);
   await page.rest();
   const heavy = await page.tip();
-  await page.focus(".slider input[type=range]");
+  await page.focus("#slider-load-gravity-2-");
   for (let k = 0; k < 5; k++) await page.keyboard.press("ArrowRight");
   await page.waitForFunction((z) => window.leafdyn.now.known.tips[0][2] > z, heavy[2]);
   await page.waitForFunction(() => document.querySelectorAll("#chart path").length > 3);
