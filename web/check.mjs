@@ -47,7 +47,7 @@ async function slides() {
   await page.waitForFunction((z) => window.leafdyn.now.known.tips[0][2] < z, before[2]);
   await page.rest();
   const heavy = await page.tip();
-  await page.focus(".slider input[type=range]");
+  await page.focus("#slider-load-gravity-2-");
   for (let k = 0; k < 5; k++) await page.keyboard.press("ArrowRight");
   await page.waitForFunction((z) => window.leafdyn.now.known.tips[0][2] > z, heavy[2]);
   await page.waitForFunction(() => document.querySelectorAll("#chart path").length > 3);
@@ -109,12 +109,22 @@ async function flattens(byKeys) {
   await page.waitForFunction(() => document.getElementById("title").textContent === "undulation" && /0.08\d* high/.test(document.getElementById("summary").textContent));
   await page.rest();
   if (byKeys) {
-    await tabTo(page, "slider-stiffness-bending-2");
+    // The slider that is added has the focus, and Enter leads to its number.
+    for (const key of [torsion, bending]) {
+      await tabTo(page, "add");
+      await page.keyboard.type(key);
+      await page.keyboard.press("Enter");
+    }
+    assert.equal(await page.evaluate(() => document.activeElement.id), "slider-scale-stiffness-bending_2");
     await page.keyboard.press("Enter");
     await page.keyboard.press("Control+A");
     await page.keyboard.type("10");
     await page.keyboard.press("Enter");
   } else {
+    for (const key of [torsion, bending]) {
+      await page.fill("#add", key);
+      await page.press("#add", "Enter");
+    }
     await press(page, `[aria-label="highest ${bending}"]`);
     await page.mouse.click(0, 0);
     await page.fill(`[aria-label="highest ${bending}"]`, "10");
@@ -125,7 +135,7 @@ async function flattens(byKeys) {
   assert.equal(await page.inputValue(`[aria-label="${bending}, as a number"]`), "10");
   assert((await waves(page)) > 0.03);
   if (byKeys) {
-    await tabTo(page, "slider-stiffness-torsion", "Shift+Tab");
+    await tabTo(page, "slider-stiffness-torsion");
     for (let k = 0; k < 5; k++) await page.keyboard.press("PageUp");
   } else await drag(page, torsion, 0.97);
   await page.waitForFunction(() => Number(/([\d.]+) high/.exec(document.getElementById("summary").textContent)?.[1] ?? 0) < 0.006, null, { timeout: 60000 });
@@ -202,6 +212,7 @@ async function snaps() {
   await page.fill("#text", COLUMN);
   await page.click("#read");
   await page.waitForFunction(() => window.leafdyn.now.known.view.title === "column");
+  await page.evaluate(() => window.leafdyn.sliders.add("load.tip_force[2]"));
   const set = (value) => page.evaluate((value) => window.leafdyn.sliders.set("load.tip_force[2]", value, true), value);
   const z = async () => (await page.tip())[2];
   assert((await z()) > 0.3);

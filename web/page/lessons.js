@@ -137,7 +137,7 @@ const questionOf = (hash) => Object.keys(LESSONS).find((name) => hash === `#q=${
 
 /// The question that is open, and the leaf before its last step.
 let lesson = null;
-let step = { known: null, last: null };
+let step = { open: false, known: null };
 
 /// Opens a question, or leaves all of them.
 async function ask(name) {
@@ -153,20 +153,23 @@ async function ask(name) {
   if (/^http/.test(location.protocol)) find("lesson-chapter").href = `docs/${chapter.replace(".md", "")}/`;
   find("lesson-picture").replaceChildren();
   find("lesson-picture").style.display = lesson.picture ? "" : "none";
-  step = { known: null, last: null };
+  step = { open: false, known: null };
   const { text, name: file } = lesson.scenario();
   const asked = lesson;
   await open({ text, name: file, sliders: lesson.sliders, last: lesson.sliders[0].key, question: name });
   history.replaceState(null, "", `#q=${name}`);
-  if (lesson === asked) tellLesson(now.known);
+  if (lesson !== asked) return;
+  step.open = true;
+  tellLesson(now.known);
 }
 
 /// What just happened, in words and in the picture.
 function tellLesson(known) {
-  if (!lesson || !known) return;
+  // Until its leaf is open, numbers are those of another one.
+  if (!lesson || !known || !step.open) return;
   // A step is a change of a slider; the same leaf, solved again, is none.
   const values = JSON.stringify([...sliders.values]);
-  if (values !== step.values) step = { before: step.known || known, values };
+  if (values !== step.values) step = { open: true, before: step.known || known, values };
   step.known = known;
   find("said").replaceChildren(...lesson.said(known, step.before || known).filter(Boolean).map((text) => Object.assign(document.createElement("span"), { textContent: `${text} ` })));
   if (lesson.picture) lesson.picture(find("lesson-picture"), known);

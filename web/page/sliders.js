@@ -276,16 +276,22 @@ function marginsSlider(value) {
 
 /// Lists have a number for each vein, and a factor of all, which tells more.
 const OF_ONE_VEIN = /^(leaf|stiffness|section|blade|rest|coupling|tissue|dynamics|foundation)\..*\[/;
+/// Growth of all veins alike is another length.
+const OF_LENGTH = /^(scale:)?rest\.stretch$/;
+/// What one moves first where effects are not known, as in wind: the first number of each kind.
+const USUAL = [/^load\.g(ravity)?\[/, /^wind\.velocity/, /^load\.tip_force/, /young|bending_2/, /thickness/, /^(leaf|blade)\.length/];
 /// Effects that differ by a smaller part are those of one number by two names.
 const ONE_EFFECT = 1e-6;
 
 /// Numbers that one wants to move first: those that move the leaf most, each once.
 function first(all) {
   const finite = all.filter(({ value }) => Number.isFinite(value));
-  const able = finite.filter(({ key, value, effect, whole }) => effect > 0 && value !== 0 && !whole && !OF_ONE_VEIN.test(key));
+  const sized = finite.filter(({ key, value, whole }) => value !== 0 && !whole && !OF_ONE_VEIN.test(key) && !OF_LENGTH.test(key));
+  const able = sized.filter(({ effect }) => effect > 0);
   // Of two names that without a factor.
   const ranked = able.sort((a, b) => b.effect - a.effect || a.key.startsWith("scale:") - b.key.startsWith("scale:"));
   const once = [];
   for (const one of ranked) if (!once.some(({ effect }) => effect === one.effect || Math.abs(effect - one.effect) < ONE_EFFECT * effect)) once.push(one);
-  return (once.length ? once : finite).slice(0, 4);
+  const usual = USUAL.map((kind) => sized.find(({ key }) => kind.test(key))).filter(Boolean);
+  return [once, usual, finite].find((some) => some.length).slice(0, 4);
 }

@@ -63,7 +63,7 @@ pub fn draw(boundary: &StabilityBoundary, scenario: &Scenario) -> Drawing {
     let name = format!("{}: where the index changes", boundary.scenario);
     let mut notes = header_notes(boundary);
     if shown.iter().any(|leaf| leaf.caption.contains('×')) {
-        notes.push("×: how much larger its buckling is drawn".into());
+        notes.push("×: buckling magnified".into());
     }
     let mut drawing = new_page(PAGE.left_margin, &name, &notes, None);
     drawing.height = panels.bottom();

@@ -74,7 +74,7 @@ pub fn draw(trace: &Trace, scenario: &Scenario) -> Drawing {
     let name = format!("{}: equilibria, {} varied", trace.scenario, varied.words);
     let mut notes = header_notes(trace);
     if leaves.iter().any(|leaf| leaf.magnified.is_some()) {
-        notes.push("×: how much larger its buckling is drawn".into());
+        notes.push("×: buckling magnified".into());
     }
     let mut drawing = new_page(PAGE.left_margin, &name, &notes, None);
     let mut letters = panel_letters();

@@ -552,8 +552,8 @@ mod tests {
     fn small_displacements_are_magnified_until_they_are_visible() {
         let straight = vec![vec![DVec3::ZERO, DVec3::X]];
         for (by, factor) in [
-            (1e-3, Some(100.0)),
-            (0.04, Some(2.0)),
+            (1.5e-3, Some(100.0)),
+            (0.04, Some(5.0)),
             (0.2, None),
             (0.0, None),
         ] {
