@@ -61,7 +61,7 @@ pub struct Asked {
 /// The outcome of one of several scenarios: a leaf, or why it is refused.
 #[derive(IntoPyObject)]
 pub enum LeafOrRefusal {
-    Leaf(Leaf),
+    Leaf(Py<Leaf>),
     Refusal(String),
 }
 
@@ -350,10 +350,13 @@ pub fn relax_many(
     })?;
     let leaves = found.or_else(refuse)?.into_iter().zip(inputs);
     let leaf = |(found, input)| match found {
-        Ok(found) => LeafOrRefusal::Leaf(Leaf::new(found, input, asked.stations)),
-        Err(why) => LeafOrRefusal::Refusal(why),
+        Ok(found) => {
+            let leaf = Leaf::new(found, input, asked.stations);
+            Py::new(py, leaf).map(LeafOrRefusal::Leaf)
+        }
+        Err(why) => Ok(LeafOrRefusal::Refusal(why)),
     };
-    Ok(leaves.map(leaf).collect())
+    leaves.map(leaf).collect()
 }
 
 /// The shortest of so many times in which the library alone lets the leaf of a scenario come to rest,

@@ -9,8 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
-use crate::leaf::levers::Lever;
-use crate::leaf::nodal_loads::{NodalMoment, ScheduledLoads};
+use crate::leaf::nodal_loads::{Lever, NodalMoment, ScheduledLoads};
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
 use crate::leaf::{FollowerLoad, GrippedNode, Leaf, Loads};

@@ -8,43 +8,12 @@
 use crate::leaf::Leaf;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::loads::{NODE_COINCIDENCE_TOLERANCE, PointForce};
+use crate::leaf::nodal_loads::Lever;
 use crate::leaf::state::{Increment, State, rotation_part};
 use crate::leaf::system::System;
 use crate::rod::Wrench;
-use crate::rotation::outer;
 use crate::scenario::PointLoad;
-use glam::{DMat3, DQuat, DVec3};
-
-/// A dead force off the axis, on the section of a node. The force on the node itself is among the loads of
-/// single veins.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Lever {
-    pub rod: usize,
-    pub node: usize,
-    /// Along the directors of the section.
-    pub offset: DVec3,
-    /// Along the lab axes.
-    pub force: DVec3,
-}
-
-impl Lever {
-    /// The moment on a section with the rotation `q`.
-    pub fn moment(&self, q: DQuat) -> DVec3 {
-        (q * self.offset).cross(self.force)
-    }
-
-    /// The energy of the lever.
-    pub fn energy(&self, q: DQuat) -> f64 {
-        -self.force.dot(q * self.offset)
-    }
-
-    /// The second derivatives of the energy by the rotation of the section.
-    fn rotation_stiffness(&self, q: DQuat) -> DMat3 {
-        let arm = q * self.offset;
-        let mixed = outer(arm, self.force) + outer(self.force, arm);
-        DMat3::from_diagonal(DVec3::splat(arm.dot(self.force))) - 0.5 * mixed
-    }
-}
+use glam::{DQuat, DVec3};
 
 impl Leaf {
     /// Where force and mass of a point are off the axis, along the directors.

@@ -6,8 +6,7 @@
 
 use crate::leaf::block_tridiagonal::rod_lane;
 use crate::leaf::discrete::{DiscreteLeaf, Grid};
-use crate::leaf::levers::Lever;
-use crate::leaf::nodal_loads::{NodalMoment, ScheduledForce, ScheduledLoads};
+use crate::leaf::nodal_loads::{Lever, NodalMoment, ScheduledForce, ScheduledLoads};
 use crate::leaf::state::State;
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};

@@ -37,12 +37,11 @@ pub use crate::leaf::derivative::parameter::{
 pub use crate::leaf::direct::pattern::DirectError;
 pub use crate::leaf::direct::{BorderedSolution, DirectSolver, MatrixFactors};
 pub use crate::leaf::discrete::{DiscreteLeaf, Grid, NodeLoad};
-pub use crate::leaf::levers::Lever;
 pub use crate::leaf::mirror::{
     are_mirror_symmetric, half_state, is_mirrored, whole_leaf_changes, whole_leaf_fields,
     whole_state,
 };
-pub use crate::leaf::nodal_loads::{FollowerLoad, NodalMoment};
+pub use crate::leaf::nodal_loads::{FollowerLoad, Lever, NodalMoment};
 pub use crate::leaf::rod_ode::{FieldChange, RodFields, RodIntegrator, StationFields};
 pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::springs::SpringEnd;

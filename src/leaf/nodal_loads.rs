@@ -1,8 +1,9 @@
-//! Loads on single nodes: dead moments, loads whose factors vary in time, and loads that turn with the section.
+//! Loads on single nodes: dead moments, dead forces off the axis, loads whose factors vary in time, and loads that turn
+//! with the section.
 
-use crate::leaf::levers::Lever;
 use crate::rod::Wrench;
-use glam::{DQuat, DVec3};
+use crate::rotation::outer;
+use glam::{DMat3, DQuat, DVec3};
 use std::ops::{Add, Mul};
 
 /// A dead moment on a node of a single rod, along the lab axes.
@@ -22,6 +23,37 @@ pub struct ScheduledForce {
     pub node: usize,
     /// The force at a factor of one.
     pub force: DVec3,
+}
+
+/// A dead force off the axis, on the section of a node. The force on the node itself is among the loads of
+/// single veins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lever {
+    pub rod: usize,
+    pub node: usize,
+    /// Along the directors of the section.
+    pub offset: DVec3,
+    /// Along the lab axes.
+    pub force: DVec3,
+}
+
+impl Lever {
+    /// The moment on a section with the rotation `q`.
+    pub fn moment(&self, q: DQuat) -> DVec3 {
+        (q * self.offset).cross(self.force)
+    }
+
+    /// The energy of the lever.
+    pub fn energy(&self, q: DQuat) -> f64 {
+        -self.force.dot(q * self.offset)
+    }
+
+    /// The second derivatives of the energy by the rotation of the section.
+    pub fn rotation_stiffness(&self, q: DQuat) -> DMat3 {
+        let arm = q * self.offset;
+        let mixed = outer(arm, self.force) + outer(self.force, arm);
+        DMat3::from_diagonal(DVec3::splat(arm.dot(self.force))) - 0.5 * mixed
+    }
 }
 
 /// Loads of single veins whose factors vary in time: first those with a factor of their own, then the weights of

@@ -13,7 +13,7 @@ use crate::rotation::{cross_matrix, outer};
 use crate::scenario::{Dynamics, PolarInertia, Profile, RodPlace, Schedule, SupportMotion};
 use glam::{DMat3, DQuat, DVec3};
 use std::cmp::Ordering;
-use std::ops::AddAssign;
+use std::ops::Add;
 
 /// Inertia of a node: the mass and the moments of inertia of the adjacent half-segments, and the
 /// masses on points there.
@@ -25,8 +25,8 @@ pub struct Inertia {
     pub transverse: f64,
     /// Relative excess of the moment of inertia about d1.
     pub polar_excess: f64,
-    /// Masses off the axis, if there are any.
-    pub off_axis: OffAxisMass,
+    /// Masses off the axis; `None` without any.
+    pub off_axis: Option<OffAxisMass>,
 }
 
 /// Masses off the axis of a node, along its directors. Their velocity is u + w x R o, with the velocity u of the node,
@@ -40,12 +40,6 @@ pub struct OffAxisMass {
 }
 
 impl OffAxisMass {
-    /// Without any.
-    pub const NONE: OffAxisMass = OffAxisMass {
-        first_moment: DVec3::ZERO,
-        tensor: DMat3::ZERO,
-    };
-
     fn of_point(it: &PointMass) -> Self {
         let squared = DMat3::from_diagonal(DVec3::splat(it.offset.length_squared()));
         OffAxisMass {
@@ -53,12 +47,23 @@ impl OffAxisMass {
             tensor: it.mass * (squared - outer(it.offset, it.offset)),
         }
     }
+
+    /// The moments of inertia along the lab axes. Apart from the rest, so that a node without such masses costs no more.
+    #[cold]
+    fn tensor_along_lab_axes(&self, rotation: DQuat) -> DMat3 {
+        let frame = DMat3::from_quat(rotation);
+        frame * self.tensor * frame.transpose()
+    }
 }
 
-impl AddAssign for OffAxisMass {
-    fn add_assign(&mut self, other: OffAxisMass) {
-        self.first_moment += other.first_moment;
-        self.tensor += other.tensor;
+impl Add for OffAxisMass {
+    type Output = OffAxisMass;
+
+    fn add(self, other: OffAxisMass) -> OffAxisMass {
+        OffAxisMass {
+            first_moment: self.first_moment + other.first_moment,
+            tensor: self.tensor + other.tensor,
+        }
     }
 }
 
@@ -69,28 +74,26 @@ impl Inertia {
     }
 
     /// Inertia tensor of the node rotated by `rotation`, along the lab axes.
+    #[inline]
     pub fn tensor(&self, rotation: DQuat) -> DMat3 {
         let d1 = rotation * DVec3::X;
         let excess = self.polar_excess * self.transverse;
         let on_axis = DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess;
-        if !self.is_off_axis() {
-            return on_axis;
+        match &self.off_axis {
+            None => on_axis,
+            Some(off_axis) => on_axis + off_axis.tensor_along_lab_axes(rotation),
         }
-        let frame = DMat3::from_quat(rotation);
-        on_axis + frame * self.off_axis.tensor * frame.transpose()
     }
 
     /// Whether there are masses off the axis: rotations and displacements are coupled then.
     pub fn is_off_axis(&self) -> bool {
-        self.off_axis != OffAxisMass::NONE
+        self.off_axis.is_some()
     }
 
     /// The sum s of masses times their distances from the node, along the lab axes.
     pub fn first_moment(&self, rotation: DQuat) -> DVec3 {
-        match self.is_off_axis() {
-            true => rotation * self.off_axis.first_moment,
-            false => DVec3::ZERO,
-        }
+        let own = self.off_axis.as_ref().map(|it| it.first_moment);
+        own.map_or(DVec3::ZERO, |own| rotation * own)
     }
 
     /// The angular momentum J w + s x u about the node and the momentum m u + w x s of a node with these velocities
@@ -132,12 +135,12 @@ impl Inertia {
     /// What masses off the axis add to the kinetic energy of a node with these velocities (w, u): s . (u x w) + w . J w/2
     /// with their own J.
     pub fn off_axis_energy(&self, rotation: DQuat, [spin, velocity]: [DVec3; 2]) -> f64 {
-        if !self.is_off_axis() {
+        let Some(off_axis) = &self.off_axis else {
             return 0.0;
-        }
+        };
         let own = rotation.conjugate() * spin;
         let coupled = self.first_moment(rotation).dot(velocity.cross(spin));
-        coupled + 0.5 * own.dot(self.off_axis.tensor * own)
+        coupled + 0.5 * own.dot(off_axis.tensor * own)
     }
 }
 
@@ -444,11 +447,9 @@ impl Physics {
         let here = |it: &&PointMass| it.vein == j && leaf.grid.nearest_node(it.sigma) == i;
         let on_points = self.point_masses.iter().filter(here).map(|it| it.mass);
         let on_points = leaf.leaf.share(j) * on_points.sum::<f64>();
-        let mut off_axis = OffAxisMass::NONE;
         let beside = self.point_masses.iter().filter(here);
-        for it in beside.filter(|it| it.offset != DVec3::ZERO) {
-            off_axis += OffAxisMass::of_point(it);
-        }
+        let beside = beside.filter(|it| it.offset != DVec3::ZERO);
+        let off_axis = beside.map(OffAxisMass::of_point).reduce(OffAxisMass::add);
         let dynamics = &self.dynamics;
         let transverse = around(&dynamics.rotary_inertia[j]);
         let polar_excess = match &dynamics.polar_inertia {

@@ -175,11 +175,7 @@ const LIMITS: LeafLimits = LeafLimits {
         "L is the longest rod; \
          beyond the limit positions lose digits: choose an origin closer to the leaf",
     ),
-    base_turn: upper_limit(
-        "|turn|",
-        1e3,
-        "an angle in radians: the bases would turn more than 150 times",
-    ),
+    base_turn: upper_limit("|turn|", 1e3, "an angle in radians: more than 150 turns"),
     tissue: upper_limit("k L^4/A", 1e16, TISSUE_STIFFNESS_REASON),
     fold: upper_limit("c L^2/A", 1e12, TISSUE_STIFFNESS_REASON),
     drag: upper_limit(

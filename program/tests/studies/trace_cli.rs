@@ -265,7 +265,7 @@ fn options_that_help_are_told() {
     let run = place
         .run(column)
         .ends(0)
-        .says(&[crossings, losses, "3 times"]);
+        .says(&[crossings, losses, "3 points"]);
     contains(&place.picture("c/trace"), &[crossings]);
     assert!(!run.out.contains("doubtful"));
     let run = place

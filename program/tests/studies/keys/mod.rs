@@ -37,7 +37,7 @@ fit | leaf.joined | tip_x of free tips
 simulate-explicit | beside load.point.offset | does not move masses off the axis
 simulate-semi-implicit | dynamics.clamped | the semi-implicit method holds the base
 keep-unstable | oval | leads to no equilibrium from this start
-unbend | veins rooted gripped rollers founded oval following windy | leaf.rods
+unbend | veins beside rooted gripped rollers founded oval following windy | leaf.rods
 unbend | twisted | dead moments have no potential
 unbend | pinned jaws | the force of a holder does not follow
 unbend | gripped-in-wind | the forces of grips do not follow
