@@ -15,7 +15,7 @@ use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
 use crate::relax::same_equilibrium::{is_near_guess, is_own_mirror_image, is_same_on_two_grids};
 use crate::relax::solve_on_grid::{
     COARSEST_TURN, GridGuess, GridSolution, InitialGuess, StabilityCheck, check_stability,
-    find_grid_equilibrium, has_coarse_span,
+    find_grid_equilibrium, finest_resolving, has_coarse_span,
 };
 
 /// Newton iterations to the same equilibrium, of any index, on the next grid.
@@ -291,7 +291,7 @@ pub(super) fn solve_first_grid(
                     || match stop {
                         EquilibriumFailure::Unresolved => {
                             fixed
-                                || finer.segments() > GRIDS.finest_resolving
+                                || finer.segments() > finest_resolving(problem.leaf)
                                 || problem.out_of_time()
                         }
                         _ => last,

@@ -85,7 +85,11 @@ pub(crate) fn relax_on_grids(
     };
     let path = loaded.as_ref().and_then(|it| it.path.clone());
     let found = find_rest(&problem, half.as_ref(), first, &mut effort);
-    let found = result_with_path(found, path);
+    // Where the other loads do not come to their full size, how these were put on explains nothing.
+    let found = match path {
+        Some(_) => found.map(|leaf| leaf.with_path(path)),
+        None => found,
+    };
     Ok(equilibrium_with_stability(
         &problem,
         found,

@@ -486,7 +486,9 @@ fn list_depth(value: &Value) -> usize {
 /// its diameter.
 fn may_follow_from(error: &ScenarioError, on: &ScenarioError) -> bool {
     let in_section = on.key.is_some_and(|key| key.table() == "section");
-    in_section && matches!(error.key, Some(Key::Wall | Key::InnerDiameter))
+    // A channel without the wall that is refused has none.
+    let of_wall = on.key == Some(Key::Wall) && error.key == Some(Key::SectionShape);
+    of_wall || in_section && matches!(error.key, Some(Key::Wall | Key::InnerDiameter))
 }
 
 #[cfg(test)]

@@ -66,6 +66,10 @@ fn thousands_of_radians_at_rest_are_resolved() {
         let off = (tip(&leaf) - DVec3::X).length();
         assert!(off <= estimate(&leaf), "{curl}: {off:.1e}");
     }
+    // Under a load, too, which is put on slowly: a helix of so small a radius is a straight rod that is softer.
+    let loaded = rod("rest.twist=9000.0; load.tip_force=[0, 0, -0.1]");
+    let leaf = relaxed(&loaded, &to(1e-6));
+    assert!(leaf.outcome.is_at_rest(), "{:?}", leaf.remark);
 }
 
 /// A section that is hardly stiff against twist, and no twist; more turns than any

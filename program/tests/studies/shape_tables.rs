@@ -106,6 +106,11 @@ fn columns_without_names_are_given_by_number() {
     place.write("bare.csv", table("", |_, [x, z]| format!("{x},{z}")));
     refused(
         &place,
+        "unbend leaf.toml --shape bare.csv --column 1=x --column 1=z",
+        &["column 1=z: 1 is x already"],
+    );
+    refused(
+        &place,
         "unbend leaf.toml --shape bare.csv",
         &["bare.csv:1", "no header", "1=x"],
     );

@@ -266,7 +266,7 @@ fn options_that_help_are_told() {
         .run(column)
         .ends(0)
         .says(&[crossings, losses, "3 points"]);
-    contains(&place.picture("c/trace"), &[crossings]);
+    contains(&place.picture("c/trace"), &["--switch follows the buckled"]);
     assert!(!run.out.contains("doubtful"));
     let run = place
         .run(format!("{column} --switch --until unstable"))

@@ -15,7 +15,9 @@ use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK};
 use crate::relax::request::Progress;
 use crate::relax::saddle;
 use crate::relax::same_equilibrium::{is_same_energy, is_same_on_two_grids};
-use crate::relax::solve_on_grid::{GridGuess, InitialGuess, find_grid_equilibrium};
+use crate::relax::solve_on_grid::{
+    GridGuess, InitialGuess, find_grid_equilibrium, finest_resolving,
+};
 
 /// The finest requested grid, in segments of the grid from which it is interpolated: on a finer one
 /// Newton's method might not converge.
@@ -191,7 +193,7 @@ pub fn follow_load_path(
             }
             Err(stop) => {
                 let resolved = stop != EquilibriumFailure::Unresolved
-                    || finer.segments() > GRIDS.finest_resolving;
+                    || finer.segments() > finest_resolving(problem.leaf);
                 if (resolved && last) || spent {
                     return NestedEquilibrium::without_grids(problem)
                         .with_finer_level(level)

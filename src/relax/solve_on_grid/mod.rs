@@ -637,6 +637,13 @@ pub fn has_coarse_span(leaf: &Leaf, segments: usize) -> bool {
     grips.iter().any(is_coarse_beside)
 }
 
+/// Segments of the finest grid that is tried where coarser ones do not resolve the bending: as many as usual, or as
+/// rest curvature and dead moments alone need.
+pub fn finest_resolving(leaf: &Leaf) -> usize {
+    let wound = 2 * coarsest(leaf, 1);
+    GRIDS.finest_resolving.max(wound).min(GRIDS.finest)
+}
+
 /// Segments of the coarsest grid: `least`, or as many as resolve rest curvature, dead moments and spans between
 /// holders.
 pub fn coarsest(leaf: &Leaf, least: usize) -> usize {
