@@ -16,7 +16,7 @@ if test "$part" != run; then
         live=(--features live)
     fi
     pip install --quiet ./python
-    pip install --quiet maturin pytest mypy matplotlib tqdm pandas xarray scipy anywidget pint "dask[distributed]" nbmake ipykernel trimesh
+    pip install --quiet maturin pytest mypy matplotlib tqdm pandas xarray scipy anywidget pint "dask[distributed]" nbmake ipykernel trimesh embreex openpyxl
     # The wheel is one for all versions of Python.
     rm -rf target/wheels
     maturin build --release --locked ${live[@]+"${live[@]}"} --quiet --manifest-path python/Cargo.toml --out target/wheels

@@ -157,7 +157,6 @@ def test_progress_is_told() -> None:
 
 def test_tables_that_are_no_csv_say_so(tmp_path: Path) -> None:
     for text, said in [
-        ("load.tip_force[0] tip_x\n4 0.97\n", "divided by blanks"),
         ("load.tip_force[0];tip_x\n4;1,234\n", "may be 1.234 or 1234"),
         ("load.tip_force[0],tip_x\r4,0.97\r", "line ends"),
         ("load.tip_force[0]\n4\n", "columns of results are tip_x"),

@@ -97,15 +97,6 @@ impl<'t> DataTable<'t> {
         columns: &KnownColumns,
     ) -> Result<Self, FitError> {
         let is_known = columns.is_known;
-        for (k, map) in reading.columns.iter().enumerate() {
-            let before = &reading.columns[..k];
-            if let Some(other) = before.iter().find(|other| other.name == map.name) {
-                return Err(FitError::Data(format!(
-                    "column {}={}: {} is {} already: name each column once",
-                    map.name, map.quantity, map.name, other.quantity
-                )));
-            }
-        }
         let mapped = |name: &str| reading.columns.iter().find(|map| map.name == name);
         let known = |name: &str| is_known(name) || mapped(name).is_some();
         let named = |name: &str| match mapped(name) {

@@ -15,6 +15,10 @@ const PARTS: usize = 64;
 /// begin of the points from the base.
 const NEAR: f64 = 0.1;
 
+/// How far from the shape, in lengths, a leaf rests that did not come to rest from there, and that is this shape all the
+/// same.
+const SAME_SHAPE: f64 = 0.01;
+
 /// The part by which lengths may differ.
 const LENGTHS: f64 = 0.1;
 
@@ -83,7 +87,11 @@ pub fn relax_from_points(
     stations[PARTS] = 1.0;
     let leaf = relax::relax_from(scenario, (&stations, &rods), options, progress)?;
     let away = largest_distance(&leaf, &stations, &positions) / length;
-    if leaf.doubts.contains(&EquilibriumDoubt::RelaxedAnew) || away > NEAR {
+    let farthest = match leaf.doubts.contains(&EquilibriumDoubt::RelaxedAnew) {
+        true => SAME_SHAPE,
+        false => NEAR,
+    };
+    if away > farthest {
         return Err(PostureError::NoEquilibriumNear { away }.into());
     }
     Ok(leaf)

@@ -140,6 +140,7 @@ fn read_points(
         is_known: &is_known,
         leaves_out_others: true,
     };
+    check_distinct_names(&reading.columns)?;
     let table = DataTable::parse_text(decoded, file, &reading, &columns)?;
     let by = match group {
         Some(group) => Some(table.column_index(EXPERIMENT_NAME_COLUMN).ok_or_else(|| {
@@ -316,4 +317,17 @@ fn coordinates(table: &DataTable, scenario: &Scenario) -> Result<Coordinates, Fi
             "has no coordinates of points: name two or three columns x, y, z (from base to tip), or two pixel_x, pixel_y",
         ),
     }
+}
+
+/// Refuses two coordinates that are said to be one column.
+fn check_distinct_names(columns: &[MeasuredColumn]) -> Result<(), FitError> {
+    for (k, map) in columns.iter().enumerate() {
+        if let Some(other) = columns[..k].iter().find(|other| other.name == map.name) {
+            return Err(FitError::Data(format!(
+                "column {}={}: {} is {} already: name each column once",
+                map.name, map.quantity, map.name, other.quantity
+            )));
+        }
+    }
+    Ok(())
 }
