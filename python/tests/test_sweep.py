@@ -142,11 +142,9 @@ def test_batches_keep_their_leaves() -> None:
     assert one.tips.tolist() == leafdyn.relax(fan(3), method="explicit").tips.tolist()
     assert isinstance(other, leafdyn.RefusedLeaf)
     assert isinstance(third, leafdyn.RefusedLeaf)
-    assert other.remark.startswith("scenarios[1]: ")
-    assert third.remark.startswith("scenarios[2], fan: ")
+    assert "leaf.rods" in other.remark
+    assert third.remark.startswith("fan: ")
     assert (third.outcome, third.success) == ("refused", False)
-    with pytest.raises(type(other.error), match="leaf"):
-        raise other.error
 
 
 def test_a_limit_of_time() -> None:

@@ -71,7 +71,5 @@ class RefusedLeaf:
 
     remark: str
     """Why, and what to change."""
-    error: ValueError | TypeError
-    """What `relax` of it alone raises."""
     outcome: str = "refused"
     success: bool = False

@@ -333,10 +333,11 @@ def relax_many(
         try:
             leaves.append(checked(scenario, set))
         except (ValueError, TypeError) as refused:
+            if told:
+                leaves.append(RefusedLeaf(str(refused)))
+                continue
             refused.args = (f"scenarios[{number}]: {refused}",)
-            if not told:
-                raise
-            leaves.append(RefusedLeaf(str(refused), refused))
+            raise
     with reporter(progress) as heard:
         found = relaxed(leaves, asked, heard, told)
     for number, leaf in enumerate(found):
@@ -357,17 +358,16 @@ def relaxed(
     leaves: list[Scenario | RefusedLeaf], asked: dict[str, Any], heard: Heard | None, told: bool
 ) -> list[Equilibrium | RefusedLeaf]:
     """Many leaves at rest, without a word about those that are not; refusals are told or raised."""
-    numbers = [number for number, leaf in enumerate(leaves) if isinstance(leaf, Scenario)]
     scenarios = [leaf for leaf in leaves if isinstance(leaf, Scenario)]
-    cores = _leafdyn.relax_many([leaf._core for leaf in scenarios], asked, told, heard)
-    rest: dict[int, Equilibrium | RefusedLeaf] = {}
-    for number, leaf, core in zip(numbers, scenarios, cores):
-        if isinstance(core, str):
-            why = f"scenarios[{number}], {leaf.name}: {core}"
-            rest[number] = RefusedLeaf(why, ValueError(why))
-        else:
-            rest[number] = Equilibrium(core, (leaf, asked))
-    return [rest[number] if isinstance(leaf, Scenario) else leaf for number, leaf in enumerate(leaves)]
+    cores = iter(_leafdyn.relax_many([leaf._core for leaf in scenarios], asked, told, heard))
+    found: list[Equilibrium | RefusedLeaf] = []
+    for leaf in leaves:
+        if isinstance(leaf, RefusedLeaf):
+            found.append(leaf)
+            continue
+        core = next(cores)
+        found.append(RefusedLeaf(f"{leaf.name}: {core}") if isinstance(core, str) else Equilibrium(core, (leaf, asked)))
+    return found
 
 
 def modes(

@@ -169,7 +169,7 @@ def _at(base: Scenario, point: Mapping[str, Any], told: bool) -> Scenario | Refu
         refused.args = (f"at {', '.join(f'{key} = {value}' for key, value in point.items())}: {refused}",)
         if not told:
             raise
-        return RefusedLeaf(str(refused), refused)
+        return RefusedLeaf(str(refused))
 
 
 def _solved(
