@@ -1,36 +1,14 @@
 //! Loads off the axes by shooting, which shares neither grid nor element with the relaxation.
 
-use leafdyn::scenario::PointLoad;
-use leafdyn_testing::random::{Draw, drawn, leaves};
+use leafdyn_testing::random::{Draw, add_loads_off_axis, drawn, leaves};
 use leafdyn_testing::*;
-
-/// One to three points with loads off the axes, some of which turn with the section.
-fn add_points(draw: &mut Draw, scenario: &mut Scenario, following: bool) {
-    let rods = scenario.rods.len();
-    scenario.g = [0.1, 0.0, -1.0];
-    for number in 0..1 + (3.0 * draw.even()) as usize {
-        let at = [0.25, 0.5, 0.8, 1.0][(4.0 * draw.even()) as usize];
-        let [x, y, z] = [0; 3].map(|_| draw.uniform(-0.5, 0.5));
-        scenario.points.push(PointLoad {
-            vein: ((rods as f64) * draw.even()) as usize,
-            at,
-            force: [x, y, z],
-            moment: [0.0; 3],
-            follows: following && number == 0,
-            mass: draw.uniform(0.0, 0.4),
-            offset: [0; 2].map(|_| draw.uniform(-0.2, 0.2)),
-            in_time: None,
-            landing: None,
-        });
-    }
-}
 
 #[test]
 fn on_random_leaves() {
     let mut draw = Draw(11);
     let mut agreed = 0;
     for (case, mut scenario) in drawn(leaves(), 40).into_iter().enumerate() {
-        add_points(&mut draw, &mut scenario, false);
+        add_loads_off_axis(&mut draw, &mut scenario, false);
         let leaf = relaxed(&scenario, &to(TIGHT));
         if leaf.outcome.is_success() {
             match shoot_near(&scenario, &leaf) {
@@ -121,7 +99,7 @@ fn with_loads_that_follow() {
     let mut draw = Draw(21);
     let mut agreed = 0;
     for (case, mut scenario) in drawn(leaves(), 16).into_iter().enumerate() {
-        add_points(&mut draw, &mut scenario, true);
+        add_loads_off_axis(&mut draw, &mut scenario, true);
         let leaf = relaxed(&scenario, &to(1e-10));
         if leaf.outcome.is_success() {
             let Ok(shot) = shoot_near(&scenario, &leaf) else {

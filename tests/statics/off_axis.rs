@@ -3,8 +3,7 @@
 use glam::DQuat;
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid};
 use leafdyn::internals::rotation;
-use leafdyn::scenario::PointLoad;
-use leafdyn_testing::random::{Draw, drawn, leaves};
+use leafdyn_testing::random::{Draw, add_loads_off_axis, drawn, leaves};
 use leafdyn_testing::*;
 use nalgebra::SVector;
 use num_dual::{DualNum, hessian};
@@ -296,7 +295,7 @@ fn bars_cover_the_errors_of_random_leaves() {
     let mut draw = Draw(3);
     let mut checked = 0;
     for (case, mut scenario) in drawn(leaves(), 24).into_iter().enumerate() {
-        add_points(&mut draw, &mut scenario);
+        add_loads_off_axis(&mut draw, &mut scenario, false);
         let fine = relaxed(&scenario, &to(1e-11));
         let rough = relaxed(&scenario, &to(1e-5));
         if !fine.outcome.is_success() || !rough.outcome.is_success() {
@@ -312,25 +311,4 @@ fn bars_cover_the_errors_of_random_leaves() {
         assert!(off <= told, "{case}: {off:e}, told {told:e}");
     }
     assert!(checked >= 16, "{checked}");
-}
-
-/// One to three points with loads off the axes.
-fn add_points(draw: &mut Draw, scenario: &mut Scenario) {
-    let rods = scenario.rods.len();
-    scenario.g = [0.1, 0.0, -1.0];
-    for _ in 0..1 + (3.0 * draw.even()) as usize {
-        let at = [0.25, 0.5, 0.8, 1.0][(4.0 * draw.even()) as usize];
-        let [x, y, z] = [0; 3].map(|_| draw.uniform(-0.5, 0.5));
-        scenario.points.push(PointLoad {
-            vein: ((rods as f64) * draw.even()) as usize,
-            at,
-            force: [x, y, z],
-            moment: [0.0; 3],
-            follows: false,
-            mass: draw.uniform(0.0, 0.4),
-            offset: [0; 2].map(|_| draw.uniform(-0.2, 0.2)),
-            in_time: None,
-            landing: None,
-        });
-    }
 }

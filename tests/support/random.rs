@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use leafdyn::scenario::{Profile, Scenario, Schedule};
+use leafdyn::scenario::{PointLoad, Profile, Scenario, Schedule};
 use proptest::prelude::*;
 use proptest::strategy::ValueTree;
 use proptest::test_runner::{RngSeed, TestRunner};
@@ -109,6 +109,27 @@ fn profile(value: f64, (kink, bend): (f64, f64), on: bool) -> Profile {
     match on {
         false => Profile::Constant(value),
         true => linear(&[0.0, kink, 1.0], &[value, bend * value, 0.6 * value]),
+    }
+}
+
+/// One to three points with loads off the axes, some of which turn with the section.
+pub fn add_loads_off_axis(draw: &mut Draw, scenario: &mut Scenario, following: bool) {
+    let rods = scenario.rods.len();
+    scenario.g = [0.1, 0.0, -1.0];
+    for number in 0..1 + (3.0 * draw.even()) as usize {
+        let at = [0.25, 0.5, 0.8, 1.0][(4.0 * draw.even()) as usize];
+        let [x, y, z] = [0; 3].map(|_| draw.uniform(-0.5, 0.5));
+        scenario.points.push(PointLoad {
+            vein: ((rods as f64) * draw.even()) as usize,
+            at,
+            force: [x, y, z],
+            moment: [0.0; 3],
+            follows: following && number == 0,
+            mass: draw.uniform(0.0, 0.4),
+            offset: [0; 2].map(|_| draw.uniform(-0.2, 0.2)),
+            in_time: None,
+            landing: None,
+        });
     }
 }
 
