@@ -242,6 +242,13 @@ pub(super) fn solve_first_grid(
     let mut found = NestedEquilibrium::without_grids(problem);
     let mut before: Option<GridLevel> = None;
     let mut failed: Vec<Grid> = Vec::new();
+    let (finest, finest_resolving) = match problem.keeps_unstable() {
+        true => {
+            let finest = GRIDS.finest_of_any_index.max(2 * grid.segments());
+            (finest, finest)
+        }
+        false => (GRIDS.finest_of_release, finest_resolving(problem.leaf)),
+    };
     loop {
         let from_start = GridGuess {
             grid: grid.clone(),
@@ -259,7 +266,7 @@ pub(super) fn solve_first_grid(
         }
         let finer = grid.refined();
         let fixed = problem.segments().is_some();
-        let last = fixed || finer.segments() > GRIDS.finest_of_release || problem.out_of_time();
+        let last = fixed || finer.segments() > finest || problem.out_of_time();
         match rest {
             // On so coarse a grid the equilibrium that a moving leaf reaches is not reliable.
             _ if problem.too_coarse(level.leaf.segments())
@@ -291,7 +298,7 @@ pub(super) fn solve_first_grid(
                     || match stop {
                         EquilibriumFailure::Unresolved => {
                             fixed
-                                || finer.segments() > finest_resolving(problem.leaf)
+                                || finer.segments() > finest_resolving
                                 || problem.out_of_time()
                         }
                         _ => last,

@@ -33,6 +33,9 @@ pub(super) struct GridLimits {
     /// The finest grid from whose start a leaf that moves far is released until two grids lead to one
     /// equilibrium.
     pub finest_of_release: usize,
+    /// The finest grid from whose start an equilibrium of any index is sought by Newton's method alone, unless the
+    /// bending needs more segments: where three grids lead to none, finer ones did not either, on any leaf.
+    pub finest_of_any_index: usize,
     /// The finest grid on which an equilibrium that was not found by relaxation is looked for first.
     pub finest_of_given_equilibrium: usize,
     /// The finest grid that is tried where coarser ones do not resolve the bending.
@@ -49,6 +52,7 @@ pub(super) const GRIDS: GridLimits = GridLimits {
     finest_of_loading: 64,
     finest_of_tracking: 128,
     finest_of_release: 256,
+    finest_of_any_index: 32,
     finest_of_given_equilibrium: 1024,
     finest_resolving: 2048,
     finest: 16_384,

@@ -131,27 +131,28 @@ pub fn equilibria(
         };
         relax(scenario, &options, &mut |_| {})
     };
-    let plain = find(how)?;
-    let any = find(SemiImplicit {
+    all.add_equilibrium(find(how)?, true);
+    let of_any_index = SemiImplicit {
         keep_unstable: true,
         ..how
-    })?;
-    all.add_equilibrium(plain, true);
-    all.add_equilibrium(any, false);
+    };
     let mut in_vain = 0;
     let mut next = 0;
     while next < SEARCH.most_starts && in_vain < MOST_FRUITLESS_STARTS && !limit.reached() {
-        let batch: Vec<Result<Equilibrium, RelaxError>> = (next..next + SEARCH.parallel_starts)
-            .into_par_iter()
-            .map(|number| {
-                find(SemiImplicit {
-                    disturbance: Some(number),
-                    ..how
-                })
-            })
+        let disturbed = (next..next + SEARCH.parallel_starts).map(|number| SemiImplicit {
+            disturbance: Some(number),
+            ..how
+        });
+        // A saddle may need far finer grids than the others: its start is the first of all.
+        let starts: Vec<SemiImplicit> = (next == 0)
+            .then_some(of_any_index)
+            .into_iter()
+            .chain(disturbed)
             .collect();
+        let batch: Vec<Result<Equilibrium, RelaxError>> =
+            (starts.par_iter().map(|start| find(*start))).collect();
         next += SEARCH.parallel_starts;
-        for ended in batch {
+        for (start, ended) in starts.iter().zip(batch) {
             let before = all.found.len();
             let ended = ended?;
             if limit.reached() && !ended.outcome.is_success() {
@@ -159,10 +160,10 @@ pub fn equilibria(
                 continue;
             }
             all.add_equilibrium(ended, false);
-            in_vain = if all.found.len() > before {
-                0
-            } else {
-                in_vain + 1
+            in_vain = match all.found.len() > before {
+                true => 0,
+                false if start.keep_unstable => in_vain,
+                false => in_vain + 1,
             };
         }
         progress(all.starts, all.found.len());

@@ -360,13 +360,15 @@ pub fn outcome(
                     EquilibriumRemark::ExplicitStepLimit { segments }
                 }
                 EquilibriumFailure::Memory => EquilibriumRemark::OutOfMemory { segments },
+                EquilibriumFailure::StepLimit | EquilibriumFailure::Unresolved
+                    if problem.keeps_unstable() =>
+                {
+                    EquilibriumRemark::NoEquilibriumFromStart { segments }
+                }
                 EquilibriumFailure::Unresolved => EquilibriumRemark::UnresolvedBend {
                     segments,
                     obstacle: obstacle(),
                 },
-                EquilibriumFailure::StepLimit if problem.keeps_unstable() => {
-                    EquilibriumRemark::NoEquilibriumFromStart { segments }
-                }
                 _ => EquilibriumRemark::StepLimit {
                     segments,
                     obstacle: obstacle(),
