@@ -136,8 +136,9 @@ impl Session {
             Question::Set {
                 values,
                 modes,
+                coarse,
                 pull,
-            } => open.set(values, modes, pull),
+            } => open.set(values, How { modes, coarse }, pull),
             Question::Place => Ok(Answer::Place {
                 at: place::write(&open.leaf.shape),
             }),
@@ -174,6 +175,28 @@ fn calm(scenario: Scenario) -> Scenario {
 /// So many seconds from now.
 fn within(seconds: u64) -> Limit {
     Limit::with_deadline(leafdyn::run::Instant::now() + Duration::from_secs(seconds))
+}
+
+/// How a leaf is wanted.
+#[derive(Clone, Copy, Default)]
+struct How {
+    /// How many modes.
+    modes: usize,
+    /// On the coarsest grid alone.
+    coarse: bool,
+}
+
+/// Segments that are stated of the coarsest grid of a tracker, which has its own.
+const ANY_SEGMENTS: usize = 16;
+
+/// How leaves follow: as they are relaxed, or on the coarsest grid.
+fn follow_options(scenario: &Scenario, how: How) -> Options {
+    let relaxed = options(scenario, how.modes);
+    let segments = Some(ANY_SEGMENTS).filter(|_| how.coarse);
+    Options {
+        method: relaxed.method.on_grid(segments),
+        ..relaxed
+    }
 }
 
 /// How leaves are relaxed.
@@ -262,7 +285,7 @@ impl Open {
     }
 
     /// The leaf with other values: followed there if it can, or found anew.
-    fn set(&mut self, values: Values, modes: usize, pull: Option<Pull>) -> Result<Answer, Refusal> {
+    fn set(&mut self, values: Values, how: How, pull: Option<Pull>) -> Result<Answer, Refusal> {
         let values = keyed(values)?;
         let bare = scenario_of(&self.base, &values)?;
         let pulled = |scenario| match pull {
@@ -276,26 +299,40 @@ impl Open {
             && !scenario.has_moments();
         let Some(follower) = self.follower.as_mut().filter(|_| alike) else {
             let (leaf, follower) =
-                EquilibriumTracker::begin(&scenario, &options(&scenario, modes))?;
+                EquilibriumTracker::begin(&scenario, &options(&scenario, how.modes))?;
             (self.leaf, self.follower) = (leaf, follower);
             (self.values, self.scenario) = (values, bare);
             return Ok(Answer::Found(self.known()));
         };
-        follower.options(&options(&scenario, modes));
+        follower.options(&follow_options(&scenario, how));
         let (base, before) = (&self.base, &self.values);
         let along = |part: f64| match part == 1.0 {
             true => Ok(scenario.clone()),
             false => scenario_of(base, &between(base, before, &values, part)).map(pulled),
         };
-        let followed = follower.follow::<Refusal>(&along)?;
+        let mut begun = 0.0;
+        let mut followed = follower.follow::<Refusal>(&along)?;
+        let ended = match followed {
+            TrackOutcome::BranchEnded { part } => Some(part),
+            TrackOutcome::Arrived(_) => None,
+        };
+        if let Some(part) = ended.filter(|_| how.coarse) {
+            // On a coarse grid it ends elsewhere.
+            follower.options(&options(&scenario, how.modes));
+            begun = part;
+            followed = follower.follow::<Refusal>(&|rest| along(begun + (1.0 - begun) * rest))?;
+        }
         let answer = match followed {
             TrackOutcome::Arrived(leaf) => {
                 self.leaf = *leaf;
                 Answer::Followed(Known::new(&self.leaf, &bare))
             }
-            TrackOutcome::BranchEnded { part } => Answer::Left {
-                values: told(&between(base, before, &values, part)),
-            },
+            TrackOutcome::BranchEnded { part } => {
+                let part = begun + (1.0 - begun) * part;
+                Answer::Left {
+                    values: told(&between(base, before, &values, part)),
+                }
+            }
         };
         (self.values, self.scenario) = (values, bare);
         Ok(answer)
