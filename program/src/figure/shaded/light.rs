@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 pub type SpaceTriangle = [DVec3; 3];
 
 /// The irradiance of open, level ground from the sun; the rest is from the sky.
-const SUN_SHARE: f64 = 0.55;
+pub const SUN_SHARE: f64 = 0.55;
 
 /// Half of the angle under which the sun is seen, radians: larger than the real one, for softer shadows.
 const SUN_RADIUS: f64 = 0.08;
@@ -193,6 +193,20 @@ impl Lighting {
         found
     }
 
+    /// The low and the high corner of the ground at this height that lies in a shadow of some triangle, in the light of
+    /// any part of the sun; elsewhere it has the whole sun.
+    pub fn sun_shadow_bounds(&self, casters: &[SpaceTriangle], height: f64) -> [DVec2; 2] {
+        let none = [DVec2::INFINITY, DVec2::NEG_INFINITY];
+        let corners = casters.iter().flatten();
+        corners.fold(none, |[low, high], corner| {
+            let each = self.sun.iter().map(|light| {
+                let way = (corner.z - height) / light.toward.z;
+                (*corner - way * light.toward).truncate()
+            });
+            each.fold([low, high], |[low, high], it| [low.min(it), high.max(it)])
+        })
+    }
+
     /// Irradiance of level ground from the sun.
     pub fn sun_on_ground(&self, point: DVec3, subset: LightSubset) -> f64 {
         irradiance_of_ground(&self.sun, point, subset)
@@ -276,6 +290,24 @@ mod tests {
             let rim = light.sun_on_ground(DVec3::X, LightSubset::ALL) / SUN_SHARE;
             assert!((rim - 0.5).abs() < 0.1, "{height}: {rim}");
         }
+    }
+
+    #[test]
+    fn beyond_the_bounds_of_its_shadow_the_ground_has_the_whole_sun() {
+        let (height, sun) = (0.7, DVec3::new(0.5, -0.3, 1.2).normalize());
+        let casters = disc(height);
+        let light = Lighting::new(sun, &casters);
+        let [low, high] = light.sun_shadow_bounds(&casters, 0.0);
+        let mut shaded = 0;
+        for k in 0..1600 {
+            let at = DVec2::new(f64::from(k % 40), f64::from(k / 40)) * 0.15 - DVec2::splat(3.0);
+            let lost = SUN_SHARE - light.sun_on_ground(at.extend(0.0), LightSubset::ALL);
+            let inside = at.cmpge(low).all() && at.cmple(high).all();
+            assert!(inside || lost.abs() < 1e-12, "{at}: {lost}");
+            shaded += usize::from(lost > 1e-12);
+        }
+        assert!(shaded > 100);
+        assert!((high - low).max_element() < 2.0 + 6.0 * height * SUN_RADIUS);
     }
 
     /// A surface does not shade itself, however obliquely it is lit, and is lit from behind as well.

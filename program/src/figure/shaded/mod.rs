@@ -13,7 +13,7 @@ use crate::figure::drawing::space::{ParallelProjection, ViewAngles};
 use crate::figure::drawing::veins::is_vein_drawn;
 use crate::figure::drawing::{Drawing, Stroke, TEXT_COLOR, TextAnchor, is_drawable};
 use crate::figure::scenario::FigureSetting;
-use crate::figure::shaded::light::{LightSubset, Lighting, SpaceTriangle, SurfaceLight};
+use crate::figure::shaded::light::{LightSubset, Lighting, SUN_SHARE, SpaceTriangle, SurfaceLight};
 use crate::figure::shaded::raster::{CornerWeights, NearestTriangles, ProjectedTriangle};
 use crate::report::numbers::format_four_digits;
 use glam::{DQuat, DVec2, DVec3, DVec4};
@@ -404,6 +404,8 @@ struct Picture<'s> {
     projected: Vec<ProjectedTriangle>,
     /// The middle of the ground that is seen.
     ground: DVec3,
+    /// The low and the high corner of the ground that is shaded from the sun.
+    sun_shadow: [DVec2; 2],
     sky_on_ground: SkyOnGround,
 }
 
@@ -422,6 +424,7 @@ impl<'s> Picture<'s> {
             projected: (scene.triangles.iter())
                 .map(|it| camera.project(&it.corners))
                 .collect(),
+            sun_shadow: lighting.sun_shadow_bounds(&scene.casters, height),
             sky_on_ground: SkyOnGround::new(&lighting, ground, radius),
             scene,
             camera,
@@ -438,7 +441,12 @@ impl<'s> Picture<'s> {
         let away = (from_middle(column, size[0]) + from_middle(row, size[1]))
             .sqrt()
             .sqrt();
-        let sun = self.lighting.sun_on_ground(point, subset);
+        let [low, high] = self.sun_shadow;
+        let flat = point.truncate();
+        let sun = match flat.cmpge(low).all() && flat.cmple(high).all() {
+            true => self.lighting.sun_on_ground(point, subset),
+            false => SUN_SHARE,
+        };
         let light = sun + self.sky_on_ground.at(point);
         let surface = BACKGROUND.lerp(GROUND, remaining(&GROUND_FADE, away));
         surface * (1.0 + (light - 1.0) * remaining(&SHADOW_FADE, away))
