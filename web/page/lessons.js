@@ -270,5 +270,5 @@ function drawLandscape(svg, known) {
   const nearest = curve.reduce((best, one) => (Math.abs(one[0] - z) < Math.abs(best[0] - z) ? one : best));
   const [cx, cy] = place(z, nearest[1]);
   part(svg, "circle", { cx, cy: cy - 7, r: 7, fill: "var(--accent)" });
-  part(svg, "text", { x: 170, y: 150, "text-anchor": "middle" }, "height of the tip: energy above it, the leaf lies in a valley");
+  part(svg, "text", { x: 170, y: 150, "text-anchor": "middle" }, "over the height of the tip: the leaf lies in a valley");
 }
