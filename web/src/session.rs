@@ -59,6 +59,8 @@ struct Open {
     leaf: Equilibrium,
     /// None where the leaf is not at rest, or has no energy.
     follower: Option<EquilibriumTracker>,
+    /// Whether that is on a coarse grid.
+    coarse: bool,
 }
 
 /// What a page has open.
@@ -199,6 +201,16 @@ fn follow_options(scenario: &Scenario, how: How) -> Options {
     }
 }
 
+/// How far the tips of a leaf on a coarse grid are from those on finer ones at most, in lengths.
+const COARSE_DISTANCE: f64 = 0.05;
+
+/// Whether two leaves can be the same equilibrium on different grids.
+fn is_near(one: &Equilibrium, other: &Equilibrium) -> bool {
+    let mut tips = one.tips.iter().zip(&other.tips);
+    let most = COARSE_DISTANCE * one.shape.longest();
+    tips.all(|(a, b)| a.distance(*b) <= most)
+}
+
 /// How leaves are relaxed.
 fn options(scenario: &Scenario, modes: usize) -> Options {
     Options {
@@ -233,6 +245,7 @@ impl Open {
             scenario,
             leaf,
             follower,
+            coarse: false,
         })
     }
 
@@ -310,29 +323,33 @@ impl Open {
             true => Ok(scenario.clone()),
             false => scenario_of(base, &between(base, before, &values, part)).map(pulled),
         };
-        let mut begun = 0.0;
         let mut followed = follower.follow::<Refusal>(&along)?;
-        let ended = match followed {
-            TrackOutcome::BranchEnded { part } => Some(part),
-            TrackOutcome::Arrived(_) => None,
-        };
-        if let Some(part) = ended.filter(|_| how.coarse) {
-            // On a coarse grid it ends elsewhere.
-            follower.options(&options(&scenario, how.modes));
-            begun = part;
-            followed = follower.follow::<Refusal>(&|rest| along(begun + (1.0 - begun) * rest))?;
+        let was_coarse = std::mem::replace(&mut self.coarse, how.coarse);
+        if (how.coarse || was_coarse) && matches!(followed, TrackOutcome::BranchEnded { .. }) {
+            // On a coarse grid it ends elsewhere: the finer ones decide, from the leaf that is shown.
+            let exact = options(&scenario, how.modes);
+            let shape = &self.leaf.shape;
+            let here = (&shape.stations[..], &shape.rods[..]);
+            let (leaf, again) =
+                EquilibriumTracker::begin_near(&calm(scenario_of(base, before)?), &exact, here)?;
+            let is_same = is_near(&leaf, &self.leaf);
+            self.coarse = false;
+            followed = match again.filter(|_| is_same) {
+                Some(again) => {
+                    *follower = again;
+                    follower.follow::<Refusal>(&along)?
+                }
+                None => TrackOutcome::BranchEnded { part: 0.0 },
+            };
         }
         let answer = match followed {
             TrackOutcome::Arrived(leaf) => {
                 self.leaf = *leaf;
                 Answer::Followed(Known::new(&self.leaf, &bare))
             }
-            TrackOutcome::BranchEnded { part } => {
-                let part = begun + (1.0 - begun) * part;
-                Answer::Left {
-                    values: told(&between(base, before, &values, part)),
-                }
-            }
+            TrackOutcome::BranchEnded { part } => Answer::Left {
+                values: told(&between(base, before, &values, part)),
+            },
         };
         (self.values, self.scenario) = (values, bare);
         Ok(answer)

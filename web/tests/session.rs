@@ -291,8 +291,21 @@ fn a_dragged_leaf_is_coarse_and_then_exact() {
         &mut session,
         json!({ "ask": "open", "text": COLUMN, "name": "column.toml" }),
     );
-    let question = json!({ "ask": "set", "values": [["load.tip_force[2]", -0.3]], "coarse": true });
-    let left = ask(&mut session, question);
+    let push = |session: &mut Session, value: f64, coarse: bool| {
+        let values = json!([["load.tip_force[2]", value]]);
+        ask(
+            session,
+            json!({ "ask": "set", "values": values, "coarse": coarse }),
+        )
+    };
+    // Beside its fold as well.
+    for coarse in [true, false] {
+        let beside = push(&mut session, -0.108, coarse);
+        assert_eq!(beside["answer"], "followed", "{coarse}");
+        assert!(beside["tips"][0][2].as_f64().unwrap() > 0.2);
+    }
+    assert_eq!(push(&mut session, 0.3, true)["answer"], "followed");
+    let left = push(&mut session, -0.3, true);
     assert_eq!(left["answer"], "left");
     let fold = left["values"][0][1].as_f64().unwrap();
     assert!((fold + 0.1113).abs() < 2e-3, "{fold}");
