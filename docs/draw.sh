@@ -25,6 +25,12 @@ cp out/fig10/trace.svg "$top/docs/trace_fig10.svg"
 leafdyn relax scenarios/study/undulation.toml
 cp out/undulation/figure.svg "$top/docs/undulation.svg"
 
+leafdyn relax scenarios/study/undulation.toml --write surface --out out/surface
+cp out/surface/surface.png "$top/docs/undulating-leaf.png"
+
+leafdyn simulate scenarios/motion/snap.toml --write gif --out out/snap
+cp out/snap/motion.gif "$top/docs/snap.gif"
+
 leafdyn unbend scenarios/field/palm.toml --shape scenarios/field/palm.csv --format biomech --out out/palm-posture
 cp out/palm-posture/unbend.svg "$top/docs/palm.svg"
 

@@ -86,6 +86,17 @@ def reference(to: Path) -> None:
     (to / "reference.md").write_text("\n".join(lines))
 
 
+def first_screen(to: Path) -> None:
+    """The live page on the first screen of the site, behind the first paragraph, if it was built."""
+    if not (to / "live.html").exists():
+        return
+    home = to / "README.md"
+    title, first, rest = home.read_text().split("\n\n", 2)
+    picture = '<img src="docs/live.png" alt="A leaf on the live page, with its sliders">'
+    link = f'<a class="live-leaf" href="live.html"><span>Open the live page: move a slider, and the leaf follows</span>{picture}</a>'
+    home.write_text("\n\n".join([title, first, link, rest]))
+
+
 def address(scenario: Path, sliders: list[dict[str, object]]) -> str:
     """The part of an address that holds a scenario, as the live page reads it."""
     held = {"text": scenario.read_text(), "name": scenario.name, "values": [], "sliders": sliders, "view": None}
@@ -130,6 +141,7 @@ def main() -> None:
     documents(to)
     reference(to)
     gallery(to, sys.argv[2] if len(sys.argv) > 2 else None)
+    first_screen(to)
 
 
 main()

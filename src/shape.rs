@@ -13,6 +13,11 @@
 //! [`LEAST_HEIGHT`] lengths, or than four error estimates, do not count: they are joined
 //! with their neighbors.
 //!
+//! These numbers jump where an inflection appears, vanishes, or slides along a straight part. Two others do not:
+//! the **height** is half of the distance of the plane curve from the nearest one that bends to one side only, which
+//! is its convex or its concave envelope, and **weighted waves** count inflections by the turns between them. Along a
+//! sweep of a parameter both are continuous. For two and more equal waves the height is the amplitude.
+//!
 //! **Chirality.** The twist is the integral of u1 from base to tip, in radians, including
 //! the rest twist. It is positive where d2 turns about d1 like a right-handed screw seen
 //! from the base.
@@ -34,6 +39,7 @@ use glam::{DQuat, DVec2, DVec3};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 use std::f64::consts::PI;
+use std::iter;
 
 /// The state of one rod at one station. Strains and stress resultants are
 /// components along the directors (d1, d2, d3).
@@ -218,6 +224,13 @@ pub struct VeinUndulation {
     /// Largest half of a height from crest to trough, in units of length; 0
     /// without waves.
     pub amplitude: f64,
+    /// How far the vein is from one that bends to one side only, in units of length: half of the largest distance
+    /// of its profile from the convex or the concave envelope, whichever is nearer. Continuous in the shape, and
+    /// for two or more equal waves the amplitude; an S of one wave has 0.68 of it.
+    pub height: f64,
+    /// Number of waves, continuous in the shape: half of one more than the effective number of inflections,
+    /// weighted by the turns that vanish with them. For equal waves their number; 0 without waves.
+    pub weighted_waves: f64,
     /// Mean distance along the vein between one crest and the next, in units
     /// of length; `None` without waves.
     pub wavelength: Option<f64>,
@@ -254,6 +267,8 @@ impl Serialize for VeinUndulation {
         serializer.collect_map([
             ("waves", Some(self.waves())),
             ("amplitude", Some(self.amplitude)),
+            ("height", Some(self.height)),
+            ("weighted_waves", Some(self.weighted_waves)),
             ("wavelength", self.wavelength),
             ("twist", Some(self.twist)),
             ("tension", Some(self.tension)),
@@ -279,6 +294,8 @@ impl Serialize for SerializedMargin<'_> {
         serializer.collect_map([
             ("waves", Some(vein.waves())),
             ("amplitude", Some(vein.amplitude)),
+            ("height", Some(vein.height)),
+            ("weighted_waves", Some(vein.weighted_waves)),
             ("wavelength", vein.wavelength),
             ("predicted_waves", Some(vein.predicted_waves())),
         ])
@@ -314,7 +331,9 @@ impl Undulation {
         let least = (LEAST_HEIGHT * longest).max(HEIGHT_ERROR_MULTIPLE * error.unwrap_or(0.0));
         let veins = (0..lines.len().min(rods.len()))
             .map(|j| {
-                let half_waves = half_waves(lines, j, least);
+                let curve = DevelopedCurve::from_vein(lines, j);
+                let half_waves = half_waves(&curve, least);
+                let height = curve.height();
                 let material = &scenario.rods[j];
                 // Forces act on the longer arms of a vein that has grown.
                 let grown = material.rest_stretch.integral(1.0);
@@ -324,6 +343,8 @@ impl Undulation {
                     amplitude: amplitude(&half_waves),
                     wavelength: wavelength(&half_waves),
                     half_waves: half_waves.len(),
+                    height,
+                    weighted_waves: curve.weighted_waves(height / least),
                     twist: twist(&lines[j]),
                     tension,
                     load_number: tension.abs() * grown * material.length.powi(2) / bending,
@@ -364,6 +385,13 @@ impl Undulation {
             std::cmp::Ordering::Greater => Some(last),
             _ => Some(first),
         }
+    }
+
+    /// How far the margins are from bending to one side only, in units of length: the larger
+    /// [`height`](VeinUndulation::height) of both, continuous in the shape.
+    pub fn height(&self) -> f64 {
+        let heights = self.margins().into_iter().flatten();
+        heights.map(|vein| vein.height).fold(0.0, f64::max)
     }
 
     /// Mean twist of all veins from base to tip, in radians.
@@ -419,7 +447,7 @@ struct DevelopedCurve {
 }
 
 impl DevelopedCurve {
-    /// The curve of vein `j`, which has at least three nodes.
+    /// The curve of vein `j`.
     fn from_vein(lines: &[Centerline], j: usize) -> Self {
         let line = &lines[j];
         let steps: Vec<DVec3> = (line.windows(2))
@@ -480,6 +508,35 @@ impl DevelopedCurve {
         found
     }
 
+    /// Half of the distance from the nearest profile that bends to one side only: over the arc length stands the
+    /// integral of the angle, so that a rotation adds a straight line, which changes no distance.
+    fn height(&self) -> f64 {
+        let mut at = DVec2::ZERO;
+        let mut profile = vec![at];
+        let lengths = self.arc_lengths.windows(2).map(|ends| ends[1] - ends[0]);
+        for (length, angle) in lengths.zip(segment_angles(&self.turns)) {
+            // Nodes that coincide are one.
+            if length > 0.0 {
+                at += length * DVec2::new(1.0, angle);
+                profile.push(at);
+            }
+        }
+        let mirrored: Vec<DVec2> = profile.iter().map(|it| DVec2::new(it.x, -it.y)).collect();
+        0.5 * distance_from_convex(&profile).min(distance_from_convex(&mirrored))
+    }
+
+    /// The number of waves, weighted. Below the least height, of which `height` is a multiple, it vanishes in
+    /// proportion.
+    fn weighted_waves(&self, height: f64) -> f64 {
+        let turns = inflection_turns(&segment_angles(&self.turns));
+        let sum: f64 = turns.iter().sum();
+        let squares: f64 = turns.iter().map(|turn| turn * turn).sum();
+        match squares > 0.0 {
+            true => 0.5 * (1.0 + sum * sum / squares) * height.min(1.0),
+            false => 0.0,
+        }
+    }
+
     fn half_wave(&self, ends: [f64; 2]) -> HalfWave {
         let [from, to] = ends.map(|end| self.point(end));
         let chord = (to - from).normalize_or_zero();
@@ -499,12 +556,83 @@ impl DevelopedCurve {
     }
 }
 
-/// The half-waves of vein `j` with at least this height.
-fn half_waves(lines: &[Centerline], j: usize, least: f64) -> Vec<HalfWave> {
-    if lines[j].len() < 4 {
+/// The turn from one node to the next, added up: the angle of every segment to the first, in radians.
+fn segment_angles(turns: &[f64]) -> Vec<f64> {
+    let sums = turns.iter().scan(0.0, |angle, turn| {
+        *angle += turn;
+        Some(*angle)
+    });
+    iter::once(0.0).chain(sums).collect()
+}
+
+/// Points of a profile on its convex envelope from below (G. Andrew, Inf. Process. Lett. 9, 1979, 216).
+fn convex_envelope(profile: &[DVec2]) -> Vec<DVec2> {
+    let mut envelope: Vec<DVec2> = Vec::new();
+    for &point in profile {
+        while let [.., before, last] = envelope[..] {
+            if (last - before).perp_dot(point - last) > 0.0 {
+                break;
+            }
+            envelope.pop();
+        }
+        envelope.push(point);
+    }
+    envelope
+}
+
+/// The largest distance of a profile over its convex envelope, along its second coordinate.
+fn distance_from_convex(profile: &[DVec2]) -> f64 {
+    let envelope = convex_envelope(profile);
+    let mut piece = 0;
+    let mut largest: f64 = 0.0;
+    for point in profile {
+        while piece + 2 < envelope.len() && envelope[piece + 1].x <= point.x {
+            piece += 1;
+        }
+        if let [from, to, ..] = envelope[piece..] {
+            let slope = (to.y - from.y) / (to.x - from.x);
+            largest = largest.max(point.y - from.y - slope * (point.x - from.x));
+        }
+    }
+    largest
+}
+
+/// The turns that vanish with each inflection, radians, where the smallest turn between two inflections, or between
+/// one and an end, is removed first: their persistence (H. Edelsbrunner, D. Letscher and A. Zomorodian, Discrete
+/// Comput. Geom. 28, 2002, 511), which is continuous in the angles.
+fn inflection_turns(angles: &[f64]) -> Vec<f64> {
+    // Turns to one side, one after the other.
+    let mut bends: Vec<f64> = Vec::new();
+    for pair in angles.windows(2) {
+        let turn = pair[1] - pair[0];
+        match bends.last_mut() {
+            Some(bend) if *bend * turn >= 0.0 => *bend += turn,
+            _ => bends.push(turn),
+        }
+    }
+    let mut vanished = Vec::with_capacity(bends.len());
+    while bends.len() > 1 {
+        let smallest = (0..bends.len()).min_by(|&a, &b| bends[a].abs().total_cmp(&bends[b].abs()));
+        let Some(k) = smallest else { break };
+        let turn = bends[k].abs();
+        if k == 0 || k + 1 == bends.len() {
+            vanished.push(turn);
+            bends.remove(k);
+        } else {
+            // Both its inflections vanish, and what is beside it becomes one bend.
+            vanished.extend([turn; 2]);
+            let joined = bends[k - 1] + bends[k] + bends[k + 1];
+            bends.splice(k - 1..=k + 1, [joined]);
+        }
+    }
+    vanished
+}
+
+/// The half-waves of a curve with at least this height.
+fn half_waves(curve: &DevelopedCurve, least: f64) -> Vec<HalfWave> {
+    if curve.points.len() < 4 {
         return Vec::new();
     }
-    let curve = DevelopedCurve::from_vein(lines, j);
     let mut ends = vec![0.0];
     ends.extend(curve.inflections());
     ends.push((curve.points.len() - 1) as f64);

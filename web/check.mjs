@@ -406,10 +406,10 @@ async function questions() {
     await page.waitForFunction(() => document.body.classList.contains("lesson") && document.querySelectorAll("#said span").length > 1, null, { timeout: 60000 });
     await page.rest();
     assert(!(await page.isVisible("#summary")) && (await page.isVisible("#lesson-measure")), name);
-    assert.equal(await page.evaluate(() => window.leafdyn.sliders.shown.length), { ripple: 3, snap: 2, arch: 3 }[name]);
+    assert.equal(await page.evaluate(() => window.leafdyn.sliders.shown.length), { ripple: 3, snap: 2, arch: 4 }[name]);
   };
   await ask("ripple");
-  assert.match(await said(), /30 % longer.*ripple, 0.08/);
+  assert.match(await said(), /30 % longer.*ripple, 0\.1\d* L/);
   if (keep) await page.screenshot({ path: join(keep, "live-question-ripple.png") });
   // A point of the plane is pulled to where the leaf is flat, and the leaf follows.
   const box = await page.locator("#lesson-picture").boundingBox();
@@ -431,6 +431,18 @@ async function questions() {
   // Greenhill's length of a heavy column of this section: (7.8373 E t^2/(12 rho g))^(1/3).
   const most = Math.cbrt((7.8373 * 1.2e5 * 0.03 ** 2) / (12 * 1e-5 * 981));
   assert.match(await said(), new RegExp(`stand up to ${Number(most.toPrecision(2))} cm`));
+  // Of the same mass, thinner at its tip, it is wider; and the words are about a blade that tapers.
+  await page.check("#same-mass");
+  const mass = async () => Number(/weighs ([\d.]+) g/.exec(await said())[1]);
+  const before = await mass();
+  await set("section.thickness.value[1]", 0.015);
+  await page.waitForFunction(() => /tapers/.test(document.getElementById("said").textContent), null, { timeout: 60000 });
+  const width = await page.evaluate(() => window.leafdyn.sliders.value("section.width"));
+  assert(Math.abs(width - 0.5 * (0.03 / 0.0225)) < 1e-5, `${width} cm wide`);
+  assert.equal(await mass(), before);
+  await page.uncheck("#same-mass");
+  await set("section.thickness.value[1]", 0.03);
+  await set("section.width", 0.5);
   await set("leaf.length", 8);
   await page.waitForFunction(() => /It stands/.test(document.getElementById("said").textContent), null, { timeout: 60000 });
   const direct = await open("#q=arch");

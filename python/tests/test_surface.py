@@ -50,7 +50,8 @@ def test_angles() -> None:
 def test_files_have_the_same_surface(tmp_path: Path) -> None:
     leaf = leafdyn.relax("scenarios/paper/fig04.toml", stations=20)
     names = {path.name for path in leaf.save(tmp_path, ["surface"])}
-    assert names == {"surface.obj", "surface.ply", "surface.glb", "surface.vtp", "angles.csv"}
+    assert names == {"surface.obj", "surface.ply", "surface.glb", "surface.vtp", "surface.png", "angles.csv"}
+    assert (tmp_path / "surface.png").read_bytes().startswith(b"\x89PNG")
     both = leaf.mesh(veins=True)
     lines = [line.split() for line in (tmp_path / "surface.obj").read_text().splitlines()]
     vertices = np.array([line[1:] for line in lines if line[0] == "v"], float)

@@ -307,7 +307,9 @@ impl EquilibriumTracker {
         }
     }
 
-    /// How it is to come to rest from now on, and which of its modes are wanted.
+    /// How it is to come to rest from now on, and which of its modes are wanted. With a fixed grid it follows on the
+    /// coarsest of its own grids alone, whatever the segments, without an error estimate: for a picture while a
+    /// number is moved. Without one it then goes on to as many grids as the tolerance needs.
     pub fn options(&mut self, options: &Options) {
         self.options = options.clone();
     }
@@ -469,9 +471,11 @@ impl EquilibriumTracker {
         last: bool,
     ) -> Result<NestedEquilibrium, ContinuationFailure> {
         let leaf = Leaf::with_scale(Arc::clone(&scenario), scenario.scale());
-        let near = self
-            .at
-            .on_coarsest_grids(MAX_PREDICTED_GRIDS.min(self.at.levels.len()));
+        let predicted = match self.options.method.segments() {
+            Some(_) => 1,
+            None => MAX_PREDICTED_GRIDS.min(self.at.levels.len()),
+        };
+        let near = self.at.on_coarsest_grids(predicted);
         let near = near.unwrap_or_else(|| self.at.without_estimates());
         let found = match self.has_same_structure(&leaf) {
             true => {

@@ -210,3 +210,44 @@ fn a_branch_goes_both_ways_from_the_leaf_that_follows() {
     let there = leafdyn::relax::relax(&column(0.5), &options(), &mut |_| {}).unwrap();
     assert!(there.tips[0].distance(up) <= 2.0 * TOLERANCE);
 }
+
+/// On a fixed grid it follows on the coarsest of its grids alone, with an error that falls with the square of its
+/// spacing, for a part of the work; without one it is as accurate again as a leaf that is relaxed there.
+#[test]
+fn a_leaf_follows_on_its_coarsest_grid_and_is_refined_again() {
+    let leaf = |weight: f64| fig04_under(weight);
+    let (first, follower) = EquilibriumTracker::begin(&leaf(1.0), &options()).unwrap();
+    let mut follower = follower.expect("the leaf is at rest");
+    let coarse = Options {
+        method: Options::default().method.on_grid(Some(16)),
+        ..options()
+    };
+    let to = |follower: &mut EquilibriumTracker, ends: [f64; 2]| {
+        let at = |part: f64| Ok::<_, RelaxError>(leaf(ends[0] + part * (ends[1] - ends[0])));
+        there(follower.follow(&at).unwrap())
+    };
+    follower.options(&coarse);
+    let rough = to(&mut follower, [1.0, 1.2]);
+    let accuracy = &rough.accuracy;
+    assert_eq!(accuracy.segments, first.accuracy.segments[..1]);
+    assert_eq!(
+        (accuracy.error_estimate, rough.stable()),
+        (None, Some(true))
+    );
+    follower.options(&options());
+    let fine = to(&mut follower, [1.2, 1.3]);
+    let relaxed = |weight: f64| settle(&leaf(weight), TOLERANCE);
+    let error = fine.tips[0].distance(relaxed(1.3).tips[0]);
+    assert!(error < 2.0 * TOLERANCE, "{error}");
+    let error = rough.tips[0].distance(relaxed(1.2).tips[0]);
+    assert!(error < 1e-2 && error > TOLERANCE, "{error}");
+    let work = [&rough, &fine].map(|leaf| leaf.work.factorizations);
+    assert!(2 * work[0] <= work[1], "{work:?}");
+}
+
+/// The leaf of Fig. 4 with 5 veins and so many times its weight.
+fn fig04_under(weight: f64) -> Scenario {
+    let mut leaf = fig04(5);
+    leaf.gravity = leaf.gravity.map(|force| weight * force);
+    leaf
+}

@@ -68,6 +68,96 @@ fn waves_of_a_sine_are_counted_and_measured() {
     }
 }
 
+/// Half of the distance of an S, one wave of a sine, from its convex envelope: the envelope is the line from the origin
+/// to where tan x = x, x = 4.4934, with the slope cos x = -0.21723, and the sine is farthest above it at 1.7898.
+const HEIGHT_OF_AN_S: f64 = 0.68246;
+
+#[test]
+fn the_height_of_a_sine_is_its_amplitude_and_weighted_waves_are_its_waves() {
+    let leaf = fig04(5);
+    for (waves, part) in [(1.0, HEIGHT_OF_AN_S), (2.0, 1.0), (2.5, 1.0), (3.0, 1.0)] {
+        // Its margins are straight seen from above.
+        let rods = sheet(|sigma, across| {
+            let up = 0.005 * across * across * (2.0 * PI * waves * sigma).sin();
+            DVec3::new(sigma, 0.2 * across, up)
+        });
+        let found = measure(&leaf, &rods);
+        for vein in found.margins().unwrap() {
+            let height = vein.height / (0.005 * part);
+            assert!((height - 1.0).abs() < 0.01, "{waves}: {height}");
+            let counted = vein.weighted_waves / waves;
+            assert!((counted - 1.0).abs() < 0.01, "{waves}: {counted}");
+            assert_eq!(vein.height, found.height());
+        }
+        assert_eq!(
+            (found.veins[2].height, found.veins[2].weighted_waves),
+            (0.0, 0.0)
+        );
+    }
+}
+
+/// Largest distance of the nodes of two leaves.
+fn largest_distance(one: &[RodShape], other: &[RodShape]) -> f64 {
+    let nodes = one
+        .iter()
+        .zip(other)
+        .flat_map(|(a, b)| a.nodes.iter().zip(&b.nodes));
+    nodes
+        .map(|(a, b)| a.position.distance(b.position))
+        .fold(0.0, f64::max)
+}
+
+/// Beside a wave lies a straight tip, which is bent to one side or to the other: the last inflection comes, goes, and
+/// slides along it. Height and weighted waves change no more than the leaf does.
+#[test]
+fn height_and_weighted_waves_are_continuous_where_an_inflection_slides() {
+    let leaf = fig04(5);
+    let bent = |tip: f64| {
+        sheet(|sigma, across| {
+            let wave = 0.02 * (4.0 * PI * sigma.min(0.5)).sin();
+            let slope = 0.02 * 4.0 * PI * (sigma - 0.5).max(0.0);
+            let over = tip * ((sigma - 0.5).max(0.0) / 0.5).powi(3);
+            flat(sigma, across) + DVec3::Z * across * across * (wave + slope + over)
+        })
+    };
+    let steps = 160;
+    let tip = |k: i32| 0.02 * (2.0 * f64::from(k) / f64::from(steps) - 1.0);
+    let margin = |rods: &[RodShape]| *measure(&leaf, rods).margin().unwrap();
+    let mut largest_jump: f64 = 0.0;
+    for k in 0..steps {
+        let rods = [tip(k), tip(k + 1)].map(bent);
+        let [before, after] = [margin(&rods[0]), margin(&rods[1])];
+        let moved = largest_distance(&rods[0], &rods[1]);
+        let change = (after.height - before.height).abs();
+        assert!(change < 1.2 * moved, "{k}: {change}, {moved}");
+        let counted = (after.weighted_waves - before.weighted_waves).abs();
+        assert!(counted < 0.03, "{k}: {counted}");
+        largest_jump = largest_jump.max((after.amplitude - before.amplitude).abs() / moved);
+    }
+    assert!(
+        largest_jump > 3.0,
+        "amplitudes did not jump: {largest_jump}"
+    );
+}
+
+/// Along a sweep of the torsional stiffness the count of waves jumps from 2 to 1.5; height and weighted waves do not.
+#[test]
+fn the_height_of_an_undulating_leaf_follows_its_stiffness() {
+    let margin = |torsion: f64| {
+        let entries = format!("stiffness.torsion={torsion:?}");
+        let leaf = settle(&scenario("study/undulation", &entries), 1e-4);
+        *leaf.undulation.margin().unwrap()
+    };
+    let margins: Vec<VeinUndulation> = (0..5).map(|k| margin(2.0 + 0.25 * f64::from(k))).collect();
+    assert_eq!((margins[0].waves(), margins[4].waves()), (2.0, 1.5));
+    for pair in margins.windows(2) {
+        let lower = pair[0].height - pair[1].height;
+        let fewer = pair[0].weighted_waves - pair[1].weighted_waves;
+        assert!((0.0..3e-3).contains(&lower), "{pair:?}");
+        assert!((0.0..0.06).contains(&fewer), "{pair:?}");
+    }
+}
+
 #[test]
 fn droop_and_domes_are_no_waves() {
     let leaf = fig04(5);
@@ -87,6 +177,10 @@ fn droop_and_domes_are_no_waves() {
             for vein in &measure(&leaf, &rods).veins {
                 assert_eq!((vein.waves(), vein.amplitude), (0.0, 0.0), "{vein:?}");
                 assert_eq!(vein.wavelength, None);
+                assert!(
+                    vein.height < 1e-12 && vein.weighted_waves < 1e-9,
+                    "{vein:?}"
+                );
             }
         }
     }
@@ -133,6 +227,8 @@ fn it_does_not_matter_where_the_leaf_lies_and_how_large_it_is() {
         for (a, b) in moved.iter().zip(&found.veins) {
             assert_eq!(a.half_waves, b.half_waves);
             assert!((a.amplitude - scale * b.amplitude).abs() < 1e-12);
+            assert!((a.height - scale * b.height).abs() < 1e-12);
+            assert!((a.weighted_waves - b.weighted_waves).abs() < 1e-9);
             let lengths = a.wavelength.zip(b.wavelength);
             assert!(lengths.is_none_or(|(a, b)| (a - scale * b).abs() < 1e-12));
         }

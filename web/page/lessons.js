@@ -38,13 +38,22 @@ elevation = 1.4
 [section]
 shape = "rectangle"
 width = 0.5
-thickness = 0.03
+thickness = { at = [0.0, 1.0], value = [0.03, 0.03] }
 young = 1.2e5
 mass_density = 1e-5
 
 [load]
 g = [0.0, 0.0, -981.0]
 `;
+
+/// Thickness at the base and at the tip of that blade.
+const THICKNESSES = ["section.thickness.value[0]", "section.thickness.value[1]"];
+
+/// Its mass in g: the unit of mass is that of N s²/cm, 100 kg.
+function bladeMass() {
+  const [base, tip, length, width, density] = [...THICKNESSES, "leaf.length", "section.width", "section.mass_density"].map((key) => sliders.value(key));
+  return 1e5 * density * length * width * 0.5 * (base + tip);
+}
 
 /// Where the flat leaf of study/undulation.toml without weight loses its stability: a2/a3 for each a1 (docs/undulation.md, from its traces).
 const WAVES_BEGIN = [
@@ -109,25 +118,38 @@ const LESSONS = {
     scenario: () => ({ text: ARCH, name: "arch.toml" }),
     sliders: [
       { key: "leaf.length", low: 5, high: 45, log: false },
-      { key: "section.thickness", low: 0.01, high: 0.08, log: true },
+      { key: THICKNESSES[0], low: 0.01, high: 0.08, log: true, words: "thickness at the base" },
+      { key: THICKNESSES[1], low: 0.005, high: 0.08, log: true, words: "thickness at the tip: it tapers" },
       { key: "section.width", low: 0.1, high: 1, log: true },
     ],
+    keepMass() {
+      this.mass = bladeMass();
+    },
+    /// Of a given mass the width follows from the other numbers.
+    tie(key) {
+      if (!find("same-mass").checked || key === "section.width") return this.keepMass();
+      const width = Number((sliders.value("section.width") * (this.mass / bladeMass())).toPrecision(6));
+      const slider = sliders.shown.find((one) => one.key === "section.width");
+      slider.low = Math.min(slider.low, width);
+      slider.high = Math.max(slider.high, width);
+      sliders.values.set("section.width", width);
+      sliders.place("section.width");
+    },
     lead: "Its own weight bends it. Twice as long is twice the weight on twice the lever: what stood upright arches over, and hangs.",
-    formula: "Upright a blade of constant section stands up to the length L = (7.84 E I/(ρ g A))^⅓; of a flat section I/A = t²/12, so that L grows with t^⅔, and the width does not count. For the same mass a thicker, narrower blade stands longer.",
+    formula: "Upright a blade of constant section stands up to the length L = (7.84 E I/(ρ g A))^⅓; of a flat section I/A = t²/12, so that L grows with t^⅔, and the width does not count. For the same mass a thicker, narrower blade stands longer, and so does one that tapers: its weight is low, and its stiffness where the moment is.",
     measure: "Its length, thickness and mass, and how often it nods in a second after a touch: the frequency tells E I without cutting it.",
     chapter: "how-to-read.md",
     said(known) {
-      const [length, thickness, width] = ["leaf.length", "section.thickness", "section.width"].map((key) => sliders.value(key));
+      const [length, thickness, tip] = ["leaf.length", ...THICKNESSES].map((key) => sliders.value(key));
       const [young, density, g] = [sliders.value("section.young"), sliders.value("section.mass_density"), Math.abs(sliders.value("load.g[2]"))];
       const most = Math.cbrt((GREENHILL * young * thickness ** 2) / (12 * density * g));
-      // The unit of mass is that of N s²/cm: 100 kg.
-      const mass = 1e5 * density * length * thickness * width;
       const [x, , z] = known.tips[0];
-      const first = `Upright it could stand up to ${words(most)} cm; it is ${words(length)} cm long${length > most ? ": too long" : ""}.`;
+      const even = Math.abs(tip / thickness - 1) < 0.01;
+      const first = even ? `Upright it could stand up to ${words(most)} cm; it is ${words(length)} cm long${length > most ? ": too long" : ""}.` : `As thick all along as at its base it could stand up to ${words(most)} cm; it is ${words(length)} cm long, and ${tip < thickness ? "tapers" : "is thicker at its tip"}.`;
       const now = z > 0.8 * length ? "It stands." : z > 0 ? `It arches: its tip is ${words(z)} cm above its base and ${words(Math.abs(x))} cm aside.` : `It hangs: its tip is ${words(-z)} cm below its base.`;
       const [lowest] = known.eigenvalues;
       const nods = lowest > 0 ? ` and nods ${words(Math.sqrt(lowest) / (2 * Math.PI))} times a second` : "";
-      return [first, now, `It weighs ${words(mass)} g${nods}.`];
+      return [first, now, `It weighs ${words(bladeMass())} g${nods}.`];
     },
   },
 };
@@ -153,6 +175,8 @@ async function ask(name) {
   if (/^http/.test(location.protocol)) find("lesson-chapter").href = `docs/${chapter.replace(".md", "")}/`;
   find("lesson-picture").replaceChildren();
   find("lesson-picture").style.display = lesson.picture ? "" : "none";
+  find("same-mass-row").hidden = !lesson.tie;
+  find("same-mass").checked = false;
   step = { open: false, known: null };
   const { text, name: file } = lesson.scenario();
   const asked = lesson;
@@ -246,5 +270,5 @@ function drawLandscape(svg, known) {
   const nearest = curve.reduce((best, one) => (Math.abs(one[0] - z) < Math.abs(best[0] - z) ? one : best));
   const [cx, cy] = place(z, nearest[1]);
   part(svg, "circle", { cx, cy: cy - 7, r: 7, fill: "var(--accent)" });
-  part(svg, "text", { x: 170, y: 150, "text-anchor": "middle" }, "height of the tip: energy above it, the leaf lies in a valley");
+  part(svg, "text", { x: 170, y: 150, "text-anchor": "middle" }, "over the height of the tip: the leaf lies in a valley");
 }

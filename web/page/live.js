@@ -100,8 +100,9 @@ function restage(view) {
 const press = (id, on) => find(id).setAttribute("aria-pressed", on);
 const pressed = (id) => find(id).getAttribute("aria-pressed") === "true";
 
-/// Shows a leaf at rest, in space and in numbers.
-function show(known, at = sliders.value(trail.key)) {
+/// Shows a leaf at rest, in space and in numbers; one on a coarse grid is told as such.
+function show(known, at = sliders.value(trail.key), coarse = false) {
+  now.coarse = coarse;
   if (known.view.rods !== stage.view.rods || known.view.joined !== stage.view.joined) restage(known.view);
   now.known = known;
   now.count += 1;
@@ -125,7 +126,7 @@ function tellLeaf(known) {
   now.toldAt = performance.now();
   const { view } = known;
   find("title").textContent = document.title = view.title;
-  find("found").textContent = view.verdict;
+  find("found").textContent = now.coarse ? `${view.verdict}, on a coarse grid while it is dragged` : view.verdict;
   const soft = known.eigenvalues.length > 0 && known.eigenvalues[0] < SOFT * stiffness(known);
   if (stage.shown.mode >= 0) stage.vibrate(true, swing());
   const state = known.stable === false || !view.success ? "bad" : known.stable ? "good" : "";
@@ -174,7 +175,10 @@ function changed(done) {
     beginTrail(sliders.last, now.known);
     if (now.known) trail.add(sliders.valueIn(now.before, sliders.last), now.known);
   }
+  if (lesson && lesson.tie) lesson.tie(sliders.last);
   if (done) remember(sliders.last);
+  // Let go, it is solved as accurately as before.
+  now.dragged = !done;
   pump();
 }
 
@@ -215,11 +219,12 @@ async function pump() {
 
 async function follow(modes) {
   const asked = sliders.value(trail.key);
-  const answer = await front.ask({ ask: "set", values: [...sliders.values], modes, pull: now.pull });
+  const coarse = Boolean(now.dragged) && !modes && !now.pull;
+  const answer = await front.ask({ ask: "set", values: [...sliders.values], modes, coarse, pull: now.pull });
   if (answer.answer === "lost") return reopen(answer.error);
   if (answer.answer === "refused") return tell(answer.error);
   tell(null);
-  if (answer.answer !== "left") return show(answer, asked);
+  if (answer.answer !== "left") return show(answer, asked, coarse);
   trail.gap(asked);
   tellMotion("its stable equilibria end here: it moves on");
   find("lamp").className = "bad";
@@ -333,6 +338,7 @@ async function wonder() {
   if (exact.answer === "left") return pump();
   if (exact.answer === "followed" || exact.answer === "found") {
     now.known = exact;
+    now.coarse = false;
     stage.show(exact);
     tellLeaf(exact);
   }

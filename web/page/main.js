@@ -121,6 +121,7 @@ function listen() {
   find("slower").addEventListener("input", tellSlower);
   tellSlower();
   document.querySelectorAll("[data-view]").forEach((button) => button.addEventListener("click", () => stage.look(button.dataset.view)));
+  find("same-mass").addEventListener("change", () => LESSONS.arch.keepMass());
   document.querySelectorAll("[data-question]").forEach((button) => button.addEventListener("click", () => ask(button.dataset.question)));
   find("gallery").addEventListener("change", () => open(gallery[Number(find("gallery").value)]));
   find("read").addEventListener("click", read);

@@ -4,6 +4,7 @@ use crate::motion::Instant;
 use base64::prelude::{BASE64_STANDARD, Engine};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Scenario, Units};
+use leafdyn::shape::{LEAST_HEIGHT, Undulation};
 use leafdyn::study::{PointKind, ScenarioNumber, Trace, TraceBranch};
 use leafdyn_program::page::{self, PageData, QuantityLabel};
 use serde::Serialize;
@@ -86,7 +87,7 @@ pub struct Known {
     /// Squares of the angular frequencies.
     pub eigenvalues: Vec<f64>,
     pub reaction: Option<[f64; 3]>,
-    /// Height of the waves along its margins; 0 without waves.
+    /// Height of the waves along its margins, which is continuous; 0 where it is too low to count.
     pub waves: Option<f64>,
 }
 
@@ -108,9 +109,17 @@ impl Known {
             index: leaf.stability.negative_eigenvalues,
             eigenvalues: modes.map(|mode| mode.eigenvalue).collect(),
             reaction: (leaf.reaction.as_ref()).map(|reaction| reaction.force.to_array()),
-            waves: leaf.undulation.margin().map(|vein| vein.amplitude),
+            waves: Some(waves_of(&leaf.undulation, scenario)),
         }
     }
+}
+
+/// The height of waves, or 0 of those that are too low to count.
+fn waves_of(undulation: &Undulation, scenario: &Scenario) -> f64 {
+    let least = LEAST_HEIGHT * leafdyn::scenario::longest(&scenario.rods);
+    Some(undulation.height())
+        .filter(|height| *height >= least)
+        .unwrap_or(0.0)
 }
 
 /// A number that a slider can move, with a range around its value.
@@ -266,7 +275,7 @@ fn points(branch: &TraceBranch) -> Vec<BranchPoint> {
             value: point.value,
             tip: tip.map_or([f64::NAN; 3], |tip| tip.to_array()),
             energy: point.energy,
-            waves: point.undulation.margin().map(|vein| vein.amplitude),
+            waves: Some(point.undulation.height()),
             index,
             kind: special.then(|| point.kind.word()),
         }

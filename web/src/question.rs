@@ -31,6 +31,9 @@ pub enum Question {
         /// How many modes are wanted.
         #[serde(default)]
         modes: usize,
+        /// Whether a coarse grid is enough, as while a slider is dragged.
+        #[serde(default)]
+        coarse: bool,
         /// Where it is pulled.
         #[serde(default)]
         pull: Option<Pull>,

@@ -59,6 +59,8 @@ struct Open {
     leaf: Equilibrium,
     /// None where the leaf is not at rest, or has no energy.
     follower: Option<EquilibriumTracker>,
+    /// Whether that is on a coarse grid.
+    coarse: bool,
 }
 
 /// What a page has open.
@@ -136,8 +138,9 @@ impl Session {
             Question::Set {
                 values,
                 modes,
+                coarse,
                 pull,
-            } => open.set(values, modes, pull),
+            } => open.set(values, How { modes, coarse }, pull),
             Question::Place => Ok(Answer::Place {
                 at: place::write(&open.leaf.shape),
             }),
@@ -176,6 +179,38 @@ fn within(seconds: u64) -> Limit {
     Limit::with_deadline(leafdyn::run::Instant::now() + Duration::from_secs(seconds))
 }
 
+/// How a leaf is wanted.
+#[derive(Clone, Copy, Default)]
+struct How {
+    /// How many modes.
+    modes: usize,
+    /// On the coarsest grid alone.
+    coarse: bool,
+}
+
+/// Segments that are stated of the coarsest grid of a tracker, which has its own.
+const ANY_SEGMENTS: usize = 16;
+
+/// How leaves follow: as they are relaxed, or on the coarsest grid.
+fn follow_options(scenario: &Scenario, how: How) -> Options {
+    let relaxed = options(scenario, how.modes);
+    let segments = Some(ANY_SEGMENTS).filter(|_| how.coarse);
+    Options {
+        method: relaxed.method.on_grid(segments),
+        ..relaxed
+    }
+}
+
+/// How far the tips of a leaf on a coarse grid are from those on finer ones at most, in lengths.
+const COARSE_DISTANCE: f64 = 0.05;
+
+/// Whether two leaves can be the same equilibrium on different grids.
+fn is_near(one: &Equilibrium, other: &Equilibrium) -> bool {
+    let mut tips = one.tips.iter().zip(&other.tips);
+    let most = COARSE_DISTANCE * one.shape.longest();
+    tips.all(|(a, b)| a.distance(*b) <= most)
+}
+
 /// How leaves are relaxed.
 fn options(scenario: &Scenario, modes: usize) -> Options {
     Options {
@@ -210,6 +245,7 @@ impl Open {
             scenario,
             leaf,
             follower,
+            coarse: false,
         })
     }
 
@@ -262,7 +298,7 @@ impl Open {
     }
 
     /// The leaf with other values: followed there if it can, or found anew.
-    fn set(&mut self, values: Values, modes: usize, pull: Option<Pull>) -> Result<Answer, Refusal> {
+    fn set(&mut self, values: Values, how: How, pull: Option<Pull>) -> Result<Answer, Refusal> {
         let values = keyed(values)?;
         let bare = scenario_of(&self.base, &values)?;
         let pulled = |scenario| match pull {
@@ -276,18 +312,36 @@ impl Open {
             && !scenario.has_moments();
         let Some(follower) = self.follower.as_mut().filter(|_| alike) else {
             let (leaf, follower) =
-                EquilibriumTracker::begin(&scenario, &options(&scenario, modes))?;
+                EquilibriumTracker::begin(&scenario, &options(&scenario, how.modes))?;
             (self.leaf, self.follower) = (leaf, follower);
             (self.values, self.scenario) = (values, bare);
             return Ok(Answer::Found(self.known()));
         };
-        follower.options(&options(&scenario, modes));
+        follower.options(&follow_options(&scenario, how));
         let (base, before) = (&self.base, &self.values);
         let along = |part: f64| match part == 1.0 {
             true => Ok(scenario.clone()),
             false => scenario_of(base, &between(base, before, &values, part)).map(pulled),
         };
-        let followed = follower.follow::<Refusal>(&along)?;
+        let mut followed = follower.follow::<Refusal>(&along)?;
+        let was_coarse = std::mem::replace(&mut self.coarse, how.coarse);
+        if (how.coarse || was_coarse) && matches!(followed, TrackOutcome::BranchEnded { .. }) {
+            // On a coarse grid it ends elsewhere: the finer ones decide, from the leaf that is shown.
+            let exact = options(&scenario, how.modes);
+            let shape = &self.leaf.shape;
+            let here = (&shape.stations[..], &shape.rods[..]);
+            let (leaf, again) =
+                EquilibriumTracker::begin_near(&calm(scenario_of(base, before)?), &exact, here)?;
+            let is_same = is_near(&leaf, &self.leaf);
+            self.coarse = false;
+            followed = match again.filter(|_| is_same) {
+                Some(again) => {
+                    *follower = again;
+                    follower.follow::<Refusal>(&along)?
+                }
+                None => TrackOutcome::BranchEnded { part: 0.0 },
+            };
+        }
         let answer = match followed {
             TrackOutcome::Arrived(leaf) => {
                 self.leaf = *leaf;

@@ -260,3 +260,53 @@ fn grown_margins_are_told() {
         (&json!(1.3), &json!(1.0))
     );
 }
+
+/// While a slider is dragged the leaf is that of a coarse grid; let go, it is as accurate as before. Where the coarse
+/// grid would leave a branch, the finer ones decide.
+#[test]
+fn a_dragged_leaf_is_coarse_and_then_exact() {
+    let mut session = Session::default();
+    open(&mut session, "measured/blade.toml");
+    let set = |session: &mut Session, value: f64, coarse: bool| {
+        let values = json!([["load.g[2]", value]]);
+        let question = json!({ "ask": "set", "values": values, "coarse": coarse });
+        let leaf = ask(session, question);
+        assert_eq!(leaf["answer"], "followed", "{value} {coarse}");
+        assert_eq!(leaf["stable"], true);
+        leaf
+    };
+    for value in [-900.0, -700.0, -800.0] {
+        let rough = set(&mut session, value, true);
+        let exact = set(&mut session, value, false);
+        assert!(rough["error"].is_null() && exact["error"].as_f64() < Some(2e-3));
+        let tips = [&rough, &exact].map(|leaf| {
+            let tip = |axis: usize| leaf["tips"][0][axis].as_f64().unwrap();
+            [tip(0), tip(1), tip(2)]
+        });
+        let apart = tips[0].iter().zip(tips[1]).map(|(a, b)| (a - b).powi(2));
+        let apart = apart.sum::<f64>().sqrt();
+        assert!(apart < 0.3 && apart > 1e-6, "{apart} cm of 30");
+    }
+    ask(
+        &mut session,
+        json!({ "ask": "open", "text": COLUMN, "name": "column.toml" }),
+    );
+    let push = |session: &mut Session, value: f64, coarse: bool| {
+        let values = json!([["load.tip_force[2]", value]]);
+        ask(
+            session,
+            json!({ "ask": "set", "values": values, "coarse": coarse }),
+        )
+    };
+    // Beside its fold as well.
+    for coarse in [true, false] {
+        let beside = push(&mut session, -0.108, coarse);
+        assert_eq!(beside["answer"], "followed", "{coarse}");
+        assert!(beside["tips"][0][2].as_f64().unwrap() > 0.2);
+    }
+    assert_eq!(push(&mut session, 0.3, true)["answer"], "followed");
+    let left = push(&mut session, -0.3, true);
+    assert_eq!(left["answer"], "left");
+    let fold = left["values"][0][1].as_f64().unwrap();
+    assert!((fold + 0.1113).abs() < 2e-3, "{fold}");
+}

@@ -14,6 +14,9 @@ pub(crate) mod motion;
 mod rod;
 pub(crate) mod scenario;
 mod sensitivity;
+// A browser draws the surface itself.
+#[cfg(not(target_family = "wasm"))]
+mod shaded;
 mod trace;
 mod unbend;
 
@@ -26,6 +29,8 @@ pub use crate::figure::leaf::{draw as leaf, draw_equilibria as equilibria, draw_
 pub use crate::figure::map::draw as map;
 pub use crate::figure::motion::{draw_energies as energy, draw_filmstrip as filmstrip, write_film};
 pub use crate::figure::sensitivity::draw as sensitivity;
+#[cfg(not(target_family = "wasm"))]
+pub use crate::figure::shaded::write_surface_picture;
 pub use crate::figure::trace::draw as trace;
 pub use crate::figure::unbend::draw as unbend;
 use leafdyn::scenario::Scenario;

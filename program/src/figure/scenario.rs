@@ -367,6 +367,11 @@ impl FigureSetting {
         }
     }
 
+    /// The direction of gravity, if there is any.
+    pub fn gravity(&self) -> Option<DVec3> {
+        self.gravity
+    }
+
     /// The arrows of the first panel, or of a later one, which shows what may differ from the first:
     /// the wind at this time.
     pub fn direction_arrows(&self, first: bool, time: f64) -> Vec<DirectionArrow> {

@@ -33,6 +33,8 @@ impl WrittenResult for Equilibrium {
         FileFormat::Space("surface.glb", surface::write_glb),
         FileFormat::Space("surface.vtp", surface::write_vtp),
         FileFormat::Space("angles.csv", surface::write_angles),
+        #[cfg(not(target_family = "wasm"))]
+        FileFormat::Space("surface.png", figure::write_surface_picture),
     ];
     const BESIDES: &'static [&'static str] = &[LIVE_PAGE_FILE];
 

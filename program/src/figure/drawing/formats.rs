@@ -6,9 +6,10 @@ use crate::figure::drawing::{
 };
 use glam::DVec2;
 use rayon::prelude::*;
-use std::io;
+use std::borrow::Borrow;
 use std::io::Write;
 use std::ops::Range;
+use std::{io, iter};
 use tiny_skia::{
     FillRule, LineCap, LineJoin, Paint, PathBuilder, Pixmap, Rect, Stroke as Pen, StrokeDash,
     Transform,
@@ -140,7 +141,7 @@ pub fn checked_svg_text(drawing: &Drawing) -> String {
     svg
 }
 
-const PIXELS_PER_UNIT: f64 = 2.0;
+pub const PIXELS_PER_UNIT: f64 = 2.0;
 
 /// Bytes per chunk of the file.
 const CHUNK_BYTES: usize = 1 << 16;
@@ -161,7 +162,14 @@ pub fn write_png(drawing: &Drawing, out: &mut dyn Write) -> io::Result<()> {
         let each = some.par_iter().cloned();
         each.map(|rows| paint_rows(&shapes, width, rows)).collect()
     });
-    encode_bands([width, height], painted, out)
+    encode_bands([width, height], PngEncoding::OF_LINES, painted, out)
+}
+
+/// Writes the pixels of an opaque picture as PNG.
+pub fn write_pixels(picture: &Pixmap, out: &mut dyn Write) -> io::Result<()> {
+    let size = [picture.width(), picture.height()];
+    let all = iter::once(picture);
+    encode_bands(size, PngEncoding::OF_SHADES, all, out)
 }
 
 /// Pixels of a drawing, across and down.
@@ -218,7 +226,19 @@ fn paint_rows(shapes: &[PaintedShape], width: u32, rows: Range<u32>) -> Pixmap {
     let mut canvas = Pixmap::new(width, height).expect("a page has a width and a height");
     // White.
     canvas.data_mut().fill(u8::MAX);
-    let page = Transform::from_translate(0.0, -(rows.start as f32));
+    paint_shapes(&mut canvas, shapes, rows.start);
+    canvas
+}
+
+/// Paints a drawing over a picture of its size.
+pub fn paint_over(picture: &mut Pixmap, drawing: &Drawing) {
+    paint_shapes(picture, &painted_shapes(drawing), 0);
+}
+
+/// Paints shapes on a canvas that begins at this row of the page.
+fn paint_shapes(canvas: &mut Pixmap, shapes: &[PaintedShape], first_row: u32) {
+    let height = canvas.height();
+    let page = Transform::from_translate(0.0, -(first_row as f32));
     let page = page.pre_scale(PIXELS_PER_UNIT as f32, PIXELS_PER_UNIT as f32);
     for shape in shapes {
         let path = &shape.path;
@@ -235,10 +255,9 @@ fn paint_rows(shapes: &[PaintedShape], width: u32, rows: Range<u32>) -> Pixmap {
             canvas.fill_path(path, &solid_paint(color), FillRule::Winding, place, None);
         }
         if let Some(stroke) = &shape.stroke {
-            stroke_path(&mut canvas, path, stroke, place);
+            stroke_path(canvas, path, stroke, place);
         }
     }
-    canvas
 }
 
 /// The path; `None` if there is nothing to paint, as for a single point.
@@ -281,19 +300,39 @@ fn stroke_path(canvas: &mut Pixmap, path: &tiny_skia::Path, stroke: &Stroke, tra
     canvas.stroke_path(path, &solid_paint(stroke.color), &pen, transform, None);
 }
 
+/// How rows are filtered and compressed.
+struct PngEncoding {
+    compression: png::Compression,
+    filter: png::Filter,
+}
+
+impl PngEncoding {
+    /// Lines and text on white: a simple filter is four times as fast as choosing one row by row, for a file half as
+    /// large again.
+    const OF_LINES: PngEncoding = PngEncoding {
+        compression: png::Compression::Fast,
+        filter: png::Filter::Up,
+    };
+
+    /// Colors that change little from a pixel to the next.
+    const OF_SHADES: PngEncoding = PngEncoding {
+        compression: png::Compression::Balanced,
+        filter: png::Filter::Adaptive,
+    };
+}
+
 /// Writes rows as they are painted.
 fn encode_bands(
     [width, height]: [u32; 2],
-    bands: impl Iterator<Item = Pixmap>,
+    encoding: PngEncoding,
+    bands: impl Iterator<Item: Borrow<Pixmap>>,
     out: &mut dyn Write,
 ) -> io::Result<()> {
     let mut encoder = png::Encoder::new(out, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    // Lines and text on white: a simple filter is four times as fast as
-    // choosing one row by row, for a file half as large again.
-    encoder.set_compression(png::Compression::Fast);
-    encoder.set_filter(png::Filter::Up);
+    encoder.set_compression(encoding.compression);
+    encoder.set_filter(encoding.filter);
     encoder.set_pixel_dims(Some(png::PixelDimensions {
         xppu: DOTS_PER_METRE,
         yppu: DOTS_PER_METRE,
@@ -304,7 +343,7 @@ fn encode_bands(
     let mut rows = writer.stream_writer_with_size(CHUNK_BYTES)?;
     let mut rgb = vec![[0; 3]; width as usize];
     for band in bands {
-        for row in band.data().chunks_exact(4 * width as usize) {
+        for row in band.borrow().data().chunks_exact(4 * width as usize) {
             // The page is opaque: alpha need not be stored.
             let pixels = rgb.iter_mut().zip(row.as_chunks::<4>().0);
             pixels.for_each(|(to, [red, green, blue, _])| *to = [*red, *green, *blue]);

@@ -158,8 +158,8 @@ pub fn padded_box(low: DVec3, high: DVec3) -> [DVec3; 2] {
 
 /// A parallel projection of space onto the page.
 pub struct ParallelProjection {
-    right: DVec3,
-    up: DVec3,
+    pub right: DVec3,
+    pub up: DVec3,
     pub toward: DVec3,
     /// Pixels per length.
     scale: f64,
@@ -179,7 +179,7 @@ impl ParallelProjection {
         }
     }
 
-    fn from_view(view: ViewAngles) -> Self {
+    pub fn from_view(view: ViewAngles) -> Self {
         let (sin_a, cos_a) = view.azimuth.to_radians().sin_cos();
         let (sin_e, cos_e) = view.elevation.to_radians().sin_cos();
         let right = DVec3::new(-sin_a, cos_a, 0.0);
