@@ -76,6 +76,14 @@ remarks! {
             /// What may keep the leaf from coming to rest.
             obstacle: Option<Box<RestObstacle>>,
         } = "no-descent",
+        /// Loads without a potential beyond those for which the loaded leaf has an equilibrium.
+        #[error("the equilibrium of the slowly loaded leaf ends{} ({segments} segments)", .obstacle)]
+        EquilibriumEnds {
+            /// Segments.
+            segments: usize,
+            /// How much of the loads the leaf bears.
+            obstacle: Box<RestObstacle>,
+        } = "equilibrium-ends",
         /// A vein that bends more than the grid resolves.
         #[error(
             "a vein bends by more than a right angle within one of {segments} segments{}",
@@ -200,6 +208,18 @@ remarks! {
             /// What holds it, in the order of its length.
             between: [SpanHolder; 2],
         } = "taut-span",
+        /// Loads without a potential that grow no farther beside all others.
+        #[error(
+            " at {part:.4} of {}: beyond, the leaf moves on, to another equilibrium or to none; give less of these loads, or \
+             simulate the motion",
+            loads_text(.loads)
+        )]
+        EndOfGrowth {
+            /// The part of these loads that the leaf bears.
+            part: f64,
+            /// Keys of these loads.
+            loads: Vec<&'static str>,
+        } = "end-of-growth",
         /// Loads that are large for the stiffness.
         #[error(
             "{}: lower {}, or raise stiffness.{stiffness} of vein {}{}",
@@ -312,6 +332,18 @@ remarks! {
              loads instead, and may rest elsewhere than slow loading leads"
         )]
         ReleasedInstead = "released-instead",
+        /// Loads without a potential that were put on before the others.
+        #[error(
+            "beside all other loads the equilibrium of the slowly loaded leaf ends at {part:.4} of {}: these loads were put on \
+             first, and the leaf may rest elsewhere than it moves to from there",
+            loads_text(.loads)
+        )]
+        OtherLoadOrder {
+            /// The part of these loads that the leaf bears where they are put on last.
+            part: f64,
+            /// Keys of these loads.
+            loads: Vec<&'static str>,
+        } = "other-load-order",
         /// A given shape from which the leaf did not come to rest.
         #[error("from the given start the leaf does not come to rest: it was relaxed as without one")]
         RelaxedAnew = "relaxed-anew",
@@ -393,8 +425,16 @@ impl EquilibriumRemark {
             EquilibriumRemark::NoDescent { obstacle, .. }
             | EquilibriumRemark::UnresolvedBend { obstacle, .. }
             | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_deref(),
+            EquilibriumRemark::EquilibriumEnds { obstacle, .. } => Some(obstacle),
             _ => None,
         }
+    }
+}
+
+impl RestObstacle {
+    /// Whether the loads without a potential could not grow to their full size.
+    pub(super) fn is_end_of_growth(&self) -> bool {
+        matches!(self, RestObstacle::EndOfGrowth { .. })
     }
 }
 
