@@ -332,6 +332,16 @@ remarks! {
              loads instead, and may rest elsewhere than slow loading leads"
         )]
         ReleasedInstead = "released-instead",
+        /// Places along the veins that were moved to others beside them.
+        #[error(
+            "places along the veins that lie within a millionth of the length were read as one, and moved by up to {}: this \
+             may move the leaf by more than the error that is told; write them as equal numbers, or farther apart",
+            format_error_bound(*.shift)
+        )]
+        MovedPlaces {
+            /// The largest shift, a length.
+            shift: f64,
+        } = "moved-places",
         /// Loads without a potential that were put on before the others.
         #[error(
             "beside all other loads the equilibrium of the slowly loaded leaf ends at {part:.4} of {}: these loads were put on \
@@ -439,6 +449,12 @@ impl RestObstacle {
 }
 
 impl EquilibriumDoubt {
+    /// The doubt about places that were moved by so much, a length, where that may move the leaf by more than its error.
+    pub(super) fn about_places(shift: f64, error: Option<f64>) -> Option<Self> {
+        let may_matter = error.is_some_and(|error| shift > error);
+        may_matter.then_some(EquilibriumDoubt::MovedPlaces { shift })
+    }
+
     /// What is not certain about a path, where this route was meant.
     pub(super) fn about_path(path: &Path, meant: Route) -> Option<Self> {
         match path {

@@ -89,6 +89,8 @@ pub struct Scenario {
     pub photo: Option<Photo>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
+    /// Largest shift, as a fraction of the length, of a place along the veins that is read as one with others.
+    pub place_shift: f64,
     /// How the leaf moves; equilibria do not depend on it, but for the density if [`Scenario::g`]
     /// pulls it.
     pub dynamics: Dynamics,

@@ -253,6 +253,7 @@ impl Entries {
             wind,
             photo,
             tolerance,
+            place_shift: self.largest_place_shift(),
             dynamics,
         };
         scenario.apply_load_factor(0.0);

@@ -1,6 +1,7 @@
 //! Places of several tables that are meant to be one and differ by rounding, or by the digits that were written, are
 //! read as one: steps and kinks of profiles, points that are loaded, and grips. Closed forms, and shooting.
 
+use leafdyn::relax::EquilibriumDoubt;
 use leafdyn_testing::*;
 
 /// How far apart what is meant to be one place is, in fractions of the length.
@@ -75,6 +76,26 @@ fn a_grip_beside_a_knot_is_at_the_knot() {
         let off = tip(&found).distance(tip(&exact));
         assert!(off <= by + 1e-8, "{by:e}: {off:.1e}");
     }
+}
+
+/// Where the shift may be more than the error that is told, a doubt says so.
+#[test]
+fn shifts_beyond_the_error_are_told() {
+    let moved = |by: f64, tolerance: f64| {
+        let found = settle(&parse(&crowded(by)), tolerance);
+        let mut doubts = found.doubts.into_iter();
+        doubts.find_map(|doubt| match doubt {
+            EquilibriumDoubt::MovedPlaces { shift } => Some(shift),
+            _ => None,
+        })
+    };
+    let told = moved(4e-7, 1e-9).unwrap();
+    assert!((4e-7..=6e-7 + 1e-15).contains(&told), "{told:e}");
+    assert_eq!(
+        [(0.0, 1e-9), (1e-13, 1e-9)].map(|(by, within)| moved(by, within)),
+        [None; 2]
+    );
+    assert_eq!(moved(1e-8, 1e-5), None);
 }
 
 /// A ramp too short for a segment is a step, a value that is reached on it and left again is refused, and so is a

@@ -592,7 +592,7 @@ fn bars_of_random_leaves_of_all_kinds_hold() {
 
 /// Blades of which some bar was too small: of an eigenvalue on 256 segments, by rounding, of positions that are
 /// right to 1e-8 of the length, and of a reaction, which is off by 1.1 bars.
-const BLADES_BEYOND: [&str; 3] = ["4 at 1e-6, ", "56 at 1e-6, ", "34 at 1e-4, "];
+const BLADES_BEYOND: [&str; 0] = [];
 
 /// As many blades as `LEAFDYN_BLADE_BARS` says.
 #[test]

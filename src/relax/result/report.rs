@@ -502,6 +502,12 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<Eq
         let strained = || stretch_doubt(scenario, rods, stations);
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
+    let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
+    let shift = scenario.place_shift * longest;
+    all.extend(EquilibriumDoubt::about_places(
+        shift,
+        leaf.accuracy.error_estimate,
+    ));
     all
 }
 

@@ -208,6 +208,12 @@ impl Entries {
         common.map_or(at, |places| places.common_place(at))
     }
 
+    /// The largest difference between a place along a vein and what it is read as.
+    pub(in crate::scenario) fn largest_place_shift(&self) -> f64 {
+        let common = self.common_places.as_ref();
+        common.map_or(0.0, |places| places.largest_shift())
+    }
+
     /// The text that the entries are from, without overrides.
     pub(crate) fn source_text(&self) -> &str {
         &self.source.text

@@ -23,6 +23,8 @@ pub(crate) const SAME_PLACE_DISTANCE: f64 = 1e-6;
 pub(in crate::scenario) struct CommonPlaces {
     /// One place of each group, ascending: the first, or the tip.
     places: Vec<f64>,
+    /// Largest distance of a place of a group from it.
+    largest_shift: f64,
 }
 
 impl CommonPlaces {
@@ -70,7 +72,21 @@ impl CommonPlaces {
                 _ => places.push(at),
             }
         }
-        (places.len() < all.len()).then_some(CommonPlaces { places })
+        if places.len() == all.len() {
+            return None;
+        }
+        let mut common = CommonPlaces {
+            places,
+            largest_shift: 0.0,
+        };
+        let shifts = all.iter().map(|&at| (common.common_place(at) - at).abs());
+        common.largest_shift = shifts.fold(0.0, f64::max);
+        Some(common)
+    }
+
+    /// The largest distance of a place from its common place.
+    pub fn largest_shift(&self) -> f64 {
+        self.largest_shift
     }
 
     /// The common place of a place that the entries name.
@@ -96,6 +112,7 @@ mod tests {
         let found = third.map(|at| common.common_place(at));
         assert_eq!(found, [0.0, 0.3333333, 0.3333333, 0.7, 1.0, 1.0]);
         assert_eq!(common.common_place(0.5), 0.5);
+        assert!((common.largest_shift() - 1e-7).abs() < 1e-15);
         let chain = [0.0, 0.5, 0.5 + 0.7e-6, 0.5 + 1.4e-6, 1.0];
         let common = CommonPlaces::of_places(chain.to_vec()).unwrap();
         assert_eq!(common.places, [0.0, 0.5, 0.5 + 1.4e-6, 1.0]);

@@ -317,12 +317,12 @@ impl<'t> DataTable<'t> {
             .iter()
             .filter_map(|map| map.name.parse().ok());
         let last: usize = numbers.max().unwrap_or(0);
-        let may_be_divided = separator == "commas" && width % 2 == 0 && last <= width / 2;
+        let half = width / 2;
+        let may_be_divided = separator == "commas" && 2 * half == width && last <= half;
         if may_be_divided && self.rows.iter().all(is_divided) {
             let why = format!(
-                "has {width} whole numbers in a row, or {} with decimal commas: divide cells with decimal commas by \
-                 semicolons or tabs, and of whole numbers leave out the columns that are not used",
-                width / 2
+                "has {width} whole numbers in a row, or {half} with decimal commas: divide cells with decimal commas by \
+                 semicolons or tabs, and of whole numbers leave out the columns that are not used"
             );
             return Err(line_error(self.file, first.number, why));
         }

@@ -234,7 +234,7 @@ impl FieldSheet {
             .map(|pair| pair[0].distance(pair[1]))
             .sum();
         let ratio = way / (last.distance - first.distance);
-        if ratio > LARGEST_WAY_RATIO || ratio < 1.0 / LARGEST_WAY_RATIO {
+        if !(1.0 / LARGEST_WAY_RATIO..=LARGEST_WAY_RATIO).contains(&ratio) {
             return Some(format!(
                 "the way from position to position is {} times that by the distances: both are in m",
                 format_two_digits(ratio)
