@@ -66,6 +66,8 @@ pub struct DiscreteLeaf {
     pub(super) followers: Vec<FollowerLoad>,
     /// Nodes that grips hold.
     pub(super) grips: Vec<GrippedNode>,
+    /// The entry of `grips` for each node, rod after rod; empty without grips. Fields of increments ask for every node.
+    pub(super) grip_of_node: Vec<Option<usize>>,
     /// Springs of supports that give.
     pub(super) springs: NodeSprings,
     /// Factor of all loads: one, except during continuation in the loads.
@@ -149,6 +151,7 @@ impl DiscreteLeaf {
             scheduled_loads: None,
             followers: Vec::new(),
             grips: Vec::new(),
+            grip_of_node: Vec::new(),
             springs: NodeSprings::default(),
             load_factor: 1.0,
             loads: leaf.loads,
@@ -160,7 +163,7 @@ impl DiscreteLeaf {
         discrete.followers = discrete.nodal_followers();
         if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
             let natural = discrete.stress_free_state();
-            discrete.grips = discrete.find_gripped_nodes(&natural);
+            discrete.set_gripped_nodes(&natural);
             discrete.limit_held_segments();
             discrete.springs = discrete.springs_from(&natural);
             if leaf.has_tissue() {

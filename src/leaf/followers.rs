@@ -14,7 +14,7 @@ use crate::leaf::state::{NodalField, State, add_to_increment, rotation_part};
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};
 use crate::rod::Wrench;
-use crate::scenario::{Profile, RodPlace};
+use crate::scenario::{Key, PointLoad, Profile, RodPlace};
 use glam::DVec3;
 
 impl Loads {
@@ -74,6 +74,29 @@ impl Leaf {
                 },
             }
         })
+    }
+
+    /// The keys of the loads without a potential that act.
+    pub fn keys_without_potential(&self) -> Vec<&'static str> {
+        let scenario = self.scenario();
+        let acts = |load: [f64; 3]| load != [0.0; 3];
+        let any_point = |of: fn(&PointLoad) -> bool| scenario.points.iter().any(of);
+        let keys = [
+            (scenario.follower.is_some(), Key::Follower.path()),
+            (scenario.couple.is_some(), Key::Couple.path()),
+            (
+                any_point(|it| it.follows && it.force != [0.0; 3]),
+                Key::PointForce.path(),
+            ),
+            (
+                any_point(|it| it.moment != [0.0; 3]),
+                Key::PointMoment.path(),
+            ),
+            (acts(scenario.tip_moment), Key::TipMoment.path()),
+            (self.in_wind(), Key::WindVelocity.path()),
+        ];
+        let acting = keys.into_iter().filter(|(acts, _)| *acts);
+        acting.map(|(_, key)| key).collect()
     }
 
     /// Upper bound on the integral along any rod of the moment by these loads alone, as if all acted on

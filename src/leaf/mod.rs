@@ -265,7 +265,7 @@ impl Leaf {
         let masses = density.iter().chain(rotary_inertia);
         let masses = masses.flat_map(Profile::kinks).copied();
         let layers = clamp_layer_edges(&scenario);
-        let kinks = distinct_places(scenario.kinks().into_iter().chain(masses).chain(layers));
+        let kinks = distinct_places(scenario.kinks().into_iter(), masses.chain(layers));
         let couple = scenario.rods.iter().flat_map(|rod| &rod.couple_stiffness);
         let softest = couple.fold(f64::INFINITY, |m, profile| m.min(profile.at(0.5)));
         let vector = |a: [f64; 3], unit: f64| DVec3::from_array(a) / unit;

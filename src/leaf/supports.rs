@@ -79,9 +79,21 @@ pub(super) struct UnbalancedSize {
 }
 
 impl DiscreteLeaf {
+    /// Sets the nodes of grips.
+    pub(super) fn set_gripped_nodes(&mut self, natural: &State) {
+        self.grips = self.find_gripped_nodes(natural);
+        self.grip_of_node = Vec::new();
+        if !self.grips.is_empty() {
+            self.grip_of_node = vec![None; self.rods() * (self.segments() + 1)];
+        }
+        for (number, held) in self.grips.iter().enumerate().rev() {
+            self.grip_of_node[natural.base(held.rod) + held.node] = Some(number);
+        }
+    }
+
     /// The nodes of grips: where they are in the stress-free state `natural`, moved by the displacements of
     /// the grips.
-    pub(super) fn find_gripped_nodes(&self, natural: &State) -> Vec<GrippedNode> {
+    fn find_gripped_nodes(&self, natural: &State) -> Vec<GrippedNode> {
         let length = self.leaf.scale.length;
         let each = self.leaf.scenario().grips.iter().enumerate();
         let nodes = each.flat_map(|(number, grip)| {
@@ -133,8 +145,8 @@ impl DiscreteLeaf {
                 displacement: BVec3::FALSE,
             };
         }
-        let here = |it: &&GrippedNode| (it.rod, it.node) == (j, i);
-        match self.grips.iter().find(here) {
+        let number = self.grip_of_node.get(j * (self.segments() + 1) + i);
+        match number.and_then(|number| self.grips.get((*number)?)) {
             Some(held) => NodeFreedom {
                 rotation: held.rotation.is_none(),
                 displacement: !held.held_axes,

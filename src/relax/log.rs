@@ -15,6 +15,8 @@ pub enum Strategy {
     SlowLoading,
     /// The method of the request from its start, wherever that leads.
     Release,
+    /// The method of the request from its start, with the loads without a potential put on before the others.
+    OtherLoadOrder,
     /// Newton's method from a shape that is given.
     GivenShape,
 }
@@ -66,6 +68,7 @@ impl fmt::Display for Attempt {
             Strategy::FirstValley => "Newton's method from arcs",
             Strategy::SlowLoading => "slow loading",
             Strategy::Release => "release",
+            Strategy::OtherLoadOrder => "loads without a potential first",
             Strategy::GivenShape => "Newton's method from the given shape",
         };
         let extent = match self.extent {
@@ -106,6 +109,9 @@ pub(crate) struct WorkLog<'o> {
     pub loading_node_evaluations: usize,
     /// How far the leaf came on its path before it failed.
     pub farthest_position: Option<PathPosition>,
+    /// The part of the loads without a potential that the leaf bears after all others are put on, if they could not grow
+    /// to their full size.
+    pub borne_part: Option<f64>,
     /// The attempts to bring the leaf to rest.
     pub attempts: Vec<Attempt>,
     /// Memory that the equations of one grid leave to those of the next.
@@ -121,6 +127,7 @@ impl<'o> WorkLog<'o> {
             node_evaluations: 0,
             loading_node_evaluations: 0,
             farthest_position: None,
+            borne_part: None,
             attempts: Vec::new(),
             workspace: EquationWorkspace::default(),
         }

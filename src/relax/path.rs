@@ -43,6 +43,17 @@ words! {
     }
 }
 
+/// When loads without a potential are put on a leaf: an equilibrium under all loads may lie beyond a fold of the
+/// one path, and be reached on the other.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum LoadOrder {
+    /// After the loads that have a potential.
+    #[default]
+    PotentialFirst,
+    /// Before them.
+    PotentialLast,
+}
+
 /// A place on the path of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PathPosition {

@@ -10,7 +10,7 @@
 use crate::leaf::{Leaf, Loads};
 use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::log::{Extent, Strategy};
-use crate::relax::path::{Path, Route};
+use crate::relax::path::{LoadOrder, Path, Route};
 use crate::relax::request::{Method, Options, SemiImplicit};
 
 /// The coarsest and the finest grids on which a leaf is brought to rest, in segments a vein.
@@ -144,6 +144,8 @@ pub struct RelaxationProblem<'a> {
     /// The whole leaf at rest under the loads that have a potential, from which the others grow; `None`: they
     /// grow from where a release from arcs leads.
     pub loaded_start: Option<&'a GridLevel>,
+    /// When loads without a potential grow.
+    pub load_order: LoadOrder,
 }
 
 impl<'a> RelaxationProblem<'a> {
@@ -158,6 +160,7 @@ impl<'a> RelaxationProblem<'a> {
             planar: false,
             valley: ValleyPolicy::MayLeave,
             loaded_start: None,
+            load_order: LoadOrder::default(),
         }
     }
 
@@ -203,6 +206,13 @@ impl<'a> RelaxationProblem<'a> {
     pub fn grows_from_slow_loading(&self) -> bool {
         let grows = self.leaf.loads.has_followers() || self.leaf.in_wind();
         self.may_load_slowly() && grows
+    }
+
+    /// Whether loads without a potential may also grow before the others.
+    fn may_load_in_other_order(&self) -> bool {
+        may_keep_start_valley(self.options.method)
+            && self.options.route == Route::Loading
+            && self.leaf.loads.has_followers()
     }
 
     /// Whether slow loading is asked for, and possible for this leaf.
@@ -380,6 +390,13 @@ pub fn plan(problem: &RelaxationProblem, has_half: bool, segments: usize) -> Vec
                 ..release
             },
         );
+    }
+    if problem.may_load_in_other_order() {
+        attempts.push(PlannedAttempt {
+            strategy: Strategy::OtherLoadOrder,
+            needs_time: true,
+            ..release
+        });
     }
     if problem.may_be_loaded_instead() {
         attempts.push(PlannedAttempt {

@@ -76,6 +76,14 @@ remarks! {
             /// What may keep the leaf from coming to rest.
             obstacle: Option<Box<RestObstacle>>,
         } = "no-descent",
+        /// Loads without a potential beyond those for which the loaded leaf has an equilibrium.
+        #[error("the equilibrium of the slowly loaded leaf ends{} ({segments} segments)", .obstacle)]
+        EquilibriumEnds {
+            /// Segments.
+            segments: usize,
+            /// How much of the loads the leaf bears.
+            obstacle: Box<RestObstacle>,
+        } = "equilibrium-ends",
         /// A vein that bends more than the grid resolves.
         #[error(
             "a vein bends by more than a right angle within one of {segments} segments{}",
@@ -200,6 +208,18 @@ remarks! {
             /// What holds it, in the order of its length.
             between: [SpanHolder; 2],
         } = "taut-span",
+        /// Loads without a potential that grow no farther beside all others.
+        #[error(
+            " at {part:.4} of {}: beyond, the leaf moves on, to another equilibrium or to none; give less of these loads, or \
+             simulate the motion",
+            loads_text(.loads)
+        )]
+        EndOfGrowth {
+            /// The part of these loads that the leaf bears.
+            part: f64,
+            /// Keys of these loads.
+            loads: Vec<&'static str>,
+        } = "end-of-growth",
         /// Loads that are large for the stiffness.
         #[error(
             "{}: lower {}, or raise stiffness.{stiffness} of vein {}{}",
@@ -312,6 +332,28 @@ remarks! {
              loads instead, and may rest elsewhere than slow loading leads"
         )]
         ReleasedInstead = "released-instead",
+        /// Places along the veins that were moved to others beside them.
+        #[error(
+            "places along the veins that lie within a millionth of the length were read as one, and moved by up to {}: this \
+             may move the leaf by more than the error that is told; write them as equal numbers, or farther apart",
+            format_error_bound(*.shift)
+        )]
+        MovedPlaces {
+            /// The largest shift, a length.
+            shift: f64,
+        } = "moved-places",
+        /// Loads without a potential that were put on before the others.
+        #[error(
+            "beside all other loads the equilibrium of the slowly loaded leaf ends at {part:.4} of {}: these loads were put on \
+             first, and the leaf may rest elsewhere than it moves to from there",
+            loads_text(.loads)
+        )]
+        OtherLoadOrder {
+            /// The part of these loads that the leaf bears where they are put on last.
+            part: f64,
+            /// Keys of these loads.
+            loads: Vec<&'static str>,
+        } = "other-load-order",
         /// A given shape from which the leaf did not come to rest.
         #[error("from the given start the leaf does not come to rest: it was relaxed as without one")]
         RelaxedAnew = "relaxed-anew",
@@ -393,12 +435,26 @@ impl EquilibriumRemark {
             EquilibriumRemark::NoDescent { obstacle, .. }
             | EquilibriumRemark::UnresolvedBend { obstacle, .. }
             | EquilibriumRemark::StepLimit { obstacle, .. } => obstacle.as_deref(),
+            EquilibriumRemark::EquilibriumEnds { obstacle, .. } => Some(obstacle),
             _ => None,
         }
     }
 }
 
+impl RestObstacle {
+    /// Whether the loads without a potential could not grow to their full size.
+    pub(super) fn is_end_of_growth(&self) -> bool {
+        matches!(self, RestObstacle::EndOfGrowth { .. })
+    }
+}
+
 impl EquilibriumDoubt {
+    /// The doubt about places that were moved by so much, a length, where that may move the leaf by more than its error.
+    pub(super) fn about_places(shift: f64, error: Option<f64>) -> Option<Self> {
+        let may_matter = error.is_some_and(|error| shift > error);
+        may_matter.then_some(EquilibriumDoubt::MovedPlaces { shift })
+    }
+
     /// What is not certain about a path, where this route was meant.
     pub(super) fn about_path(path: &Path, meant: Route) -> Option<Self> {
         match path {

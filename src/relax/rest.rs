@@ -11,7 +11,7 @@ use crate::relax::loading::arrival::{
 };
 use crate::relax::log::{AttemptEnd, Extent, Strategy, WorkLog};
 use crate::relax::nested_grids::{solve_from_guesses, solve_from_start};
-use crate::relax::path::Path;
+use crate::relax::path::{LoadOrder, Path};
 use crate::relax::plan::{
     Acceptance, GRIDS, LONGEST_WAY_IN_FIRST_VALLEY, PlannedAttempt, RelaxationProblem,
     ValleyPolicy, WayFromStart, least_segments, may_solve_half, plan,
@@ -21,6 +21,7 @@ use crate::relax::request::{
     Method, Options, Progress, RelaxError, check_hinge_equilibrium, check_natural_tips,
     check_options_without_potential, check_tolerance,
 };
+use crate::relax::result::report::ReachedLoads;
 use crate::relax::result::{Equilibrium, Outcome, report};
 use crate::relax::small_motions::small_motions;
 use crate::relax::solve_on_grid::{check_segments, explicit};
@@ -176,6 +177,10 @@ fn solve_planned<'a>(
             Strategy::FirstValley => ValleyPolicy::Stay,
             _ => ValleyPolicy::MayLeave,
         },
+        load_order: match attempt.strategy {
+            Strategy::OtherLoadOrder => LoadOrder::PotentialLast,
+            _ => LoadOrder::PotentialFirst,
+        },
         ..problem.reduced_to_half(half)
     };
     let grid = grid_of(problem.leaf, attempt.segments);
@@ -184,7 +189,7 @@ fn solve_planned<'a>(
         Ok(found) => acceptance_of(problem, attempt.acceptance, found, effort),
         Err(failure) => AttemptEnd::Failed(failure.stop),
     };
-    let path = match attempt.needs_time {
+    let path = match attempt.needs_time && problem.leaf.has_potential() {
         // The leaf is released in place of slow loading.
         true => Some(Path::Released),
         false => problem.undisturbed_path(),
@@ -265,7 +270,11 @@ pub(super) fn equilibrium_with_stability(
         false => before,
     };
     let found = decision.found.with_work(effort.work);
-    let outcome = report::outcome(problem, &found, stopped, effort.farthest_position);
+    let reached = ReachedLoads {
+        position: effort.farthest_position,
+        borne_part: effort.borne_part,
+    };
+    let outcome = report::outcome(problem, &found, stopped, reached);
     let mut leaf = report::equilibrium(problem, &found, outcome, wall);
     if matches!(leaf.path, Some(Path::Held { .. })) && !leaf.outcome.is_at_rest() {
         // What the way was like, it did not end where the leaf is held.
@@ -278,6 +287,15 @@ pub(super) fn equilibrium_with_stability(
     leaf.doubts.extend(doubt);
     leaf.doubts
         .extend(unconfirmed.then_some(EquilibriumDoubt::UnconfirmedEquilibrium));
+    let reordered = effort.attempts.last().is_some_and(|last| {
+        last.strategy == Strategy::OtherLoadOrder && last.end == AttemptEnd::Accepted
+    });
+    if let Some(part) = effort.borne_part.filter(|_| reordered) {
+        leaf.doubts.push(EquilibriumDoubt::OtherLoadOrder {
+            part,
+            loads: problem.leaf.keys_without_potential(),
+        });
+    }
     leaf.apply_stability_verdict(decision.verdict);
     let modes = decision.modes.or_else(|| {
         let list = EigenvalueRequest::requested(problem);

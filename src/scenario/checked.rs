@@ -3,6 +3,7 @@
 use crate::numbers::sorted_distinct;
 use crate::scenario::blade::Blade;
 use crate::scenario::format::Key;
+use crate::scenario::format::places::SAME_PLACE_DISTANCE;
 use crate::scenario::format::units::Units;
 use crate::scenario::loads::{
     Dynamics, FactoredLoads, Landing, PointLoad, Weight, Wind, natural_time_unit,
@@ -88,6 +89,8 @@ pub struct Scenario {
     pub photo: Option<Photo>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
+    /// Largest shift, as a fraction of the length, of a place along the veins that is read as one with others.
+    pub place_shift: f64,
     /// How the leaf moves; equilibria do not depend on it, but for the density if [`Scenario::g`]
     /// pulls it.
     pub dynamics: Dynamics,
@@ -113,20 +116,24 @@ impl Scenario {
     }
 }
 
-/// Differences of fractions of a length below which two places are the same: no segment may be so
-/// short.
-const PLACE_TOLERANCE: f64 = 1e-12;
-
-/// The fractions inside (0, 1), in their order; of those that differ by rounding alone the first.
-pub(crate) fn distinct_places(all: impl Iterator<Item = f64>) -> Vec<f64> {
-    let mut places =
-        sorted_distinct(all.filter(|&at| at > PLACE_TOLERANCE && at < 1.0 - PLACE_TOLERANCE));
-    places.dedup_by(|next, kept| *next - *kept <= PLACE_TOLERANCE);
+/// The fractions inside (0, 1) where nodes must be, ascending, and of other places of kinks those that are not
+/// beside another: a grid without a node at such a kink misses it by less than its segments could tell.
+pub(crate) fn distinct_places(
+    nodes: impl Iterator<Item = f64>,
+    kinks: impl Iterator<Item = f64>,
+) -> Vec<f64> {
+    let inside = |at: &f64| *at > SAME_PLACE_DISTANCE && *at < 1.0 - SAME_PLACE_DISTANCE;
+    let mut places = sorted_distinct(nodes.filter(inside));
+    places.dedup_by(|next, kept| *next - *kept <= SAME_PLACE_DISTANCE);
+    for kink in sorted_distinct(kinks.filter(inside)) {
+        let next = places.partition_point(|&place| place < kink);
+        let mut beside = places[next.saturating_sub(1)..].iter().take(2);
+        if beside.all(|place| (place - kink).abs() > SAME_PLACE_DISTANCE) {
+            places.insert(next, kink);
+        }
+    }
     places
 }
-
-/// A grip that ends within this fraction of the length from the tip holds the tip.
-const TIP_GRIP_TOLERANCE: f64 = 1e-11;
 
 impl Scenario {
     /// Where vein `j` begins, and the rotation of its directors there.
@@ -137,8 +144,8 @@ impl Scenario {
 
     /// Fractions inside (0, 1) where a grid must have a node: kinks of stiffnesses, rest shapes,
     /// loads and the wind's width, points that are loaded, and the ends of what is gripped;
-    /// ascending, each once, and none within rounding of another or of an end: what is there is at
-    /// the nearest node.
+    /// ascending, each once. Where kinks that follow from a blade are as close to another place as places that are
+    /// read as one, the grid has one node.
     pub fn kinks(&self) -> Vec<f64> {
         let masses = (0..self.rods.len()).filter_map(|vein| self.weight(vein).of_mass);
         let profiles = self.rods.iter().flat_map(Rod::constitutive_profiles);
@@ -152,8 +159,10 @@ impl Scenario {
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
         let ends = self.grips.iter().flat_map(|grip| grip.at);
-        let inside = points.chain(ends);
-        distinct_places(profiles.flat_map(Profile::kinks).copied().chain(inside))
+        let (given, derived): (Vec<&Profile>, Vec<&Profile>) =
+            profiles.partition(|profile| matches!(profile, Profile::Linear { .. }));
+        let [given, derived] = [given, derived].map(|all| all.into_iter().flat_map(Profile::kinks));
+        distinct_places(points.chain(ends).chain(given.copied()), derived.copied())
     }
 
     /// Fractions inside (0, 1) where a stiffness or a rest shape jumps, and with it the strains of a rod.
@@ -168,8 +177,7 @@ impl Scenario {
     pub fn holds_all_tips(&self) -> bool {
         let gripped = |vein: usize| {
             let mut grips = self.grips.iter().filter(|grip| grip.vein == vein);
-            grips
-                .any(|grip| 1.0 - grip.at[1] < TIP_GRIP_TOLERANCE && grip.rigid_axes() == [true; 3])
+            grips.any(|grip| grip.at[1] == 1.0 && grip.rigid_axes() == [true; 3])
         };
         self.held_tip.is_some() || (0..self.rods.len()).all(gripped)
     }

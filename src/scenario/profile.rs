@@ -55,7 +55,7 @@ impl From<f64> for RodPlace {
 }
 
 /// A jump this close to a place, as a fraction of the length, is there: nodes of grids and ends of steps
-/// are within rounding of the jump, or at another knot within the tolerance of places that are the same.
+/// are within rounding of the jump.
 const SAME_JUMP_DISTANCE: f64 = 4e-12;
 
 /// A quantity along a rod, over the fraction sigma = s/L of the rod's length.

@@ -163,9 +163,12 @@ impl Entries {
     /// # Errors
     /// If an entry that is needed is missing, or a value is not allowed.
     pub fn check(&self) -> ScenarioResult<Scenario> {
-        let scenario = self.read().map_err(|error| self.error_with_others(error))?;
-        limits::check_limits(self, &scenario)?;
-        check_masses_off_axis(self, &scenario)?;
+        let entries = self.with_common_places();
+        let scenario = entries
+            .read()
+            .map_err(|error| entries.error_with_others(error))?;
+        limits::check_limits(&entries, &scenario)?;
+        check_masses_off_axis(&entries, &scenario)?;
         Ok(scenario)
     }
 
@@ -250,6 +253,7 @@ impl Entries {
             wind,
             photo,
             tolerance,
+            place_shift: self.largest_place_shift(),
             dynamics,
         };
         scenario.apply_load_factor(0.0);

@@ -117,10 +117,13 @@ pub enum SimulationError {
     Request(#[from] relax::RelaxError),
     /// The leaf should start at rest, and its relaxation fails.
     #[error(
-        "dynamics.start = \"at-rest\": the leaf does not come to rest under its loads at time 0 ({outcome}): use start = \"released\""
+        "dynamics.start = \"at-rest\": on {segments} segments a vein the leaf does not come to rest under its loads at time 0 \
+         ({outcome}): give more segments, or use start = \"released\""
     )]
     NoRest {
         /// The outcome of its relaxation.
         outcome: &'static str,
+        /// Segments of a vein.
+        segments: usize,
     },
 }

@@ -64,16 +64,39 @@ pub(super) fn state_at_rest(
         limit,
         ..relax::Options::default()
     };
-    let found = relax::relax(&scenario, &options, &mut |_| {})?;
+    let alone = relax::relax(&scenario, &options, &mut |_| {})?;
+    let found = match alone.outcome.is_success() {
+        true => alone,
+        false => rest_near_accurate(&scenario, &options)?.unwrap_or(alone),
+    };
     if !found.outcome.is_success() {
         return Err(SimulationError::NoRest {
             outcome: found.outcome.word(),
+            segments: grid.segments(),
         });
     }
     let nodes = || found.shape.rods.iter().flat_map(|rod| &rod.nodes);
     let x = nodes().map(|node| node.position / leaf.scale.length);
     let q = nodes().map(|node| node.rotation);
     Ok(State::new(grid.segments(), x.collect(), q.collect()))
+}
+
+/// The equilibrium on the grid of these options next to an accurate one, where the way there is too far for the grid;
+/// `None` if no grid leads to rest.
+fn rest_near_accurate(
+    scenario: &Scenario,
+    on_grid: &relax::Options,
+) -> Result<Option<relax::Equilibrium>, relax::RelaxError> {
+    let accurate = relax::Options {
+        method: relax::SemiImplicit::on_grid(None).into(),
+        ..on_grid.clone()
+    };
+    let accurate = relax::relax(scenario, &accurate, &mut |_| {})?;
+    if !accurate.outcome.is_at_rest() {
+        return Ok(None);
+    }
+    let start = (&accurate.shape.stations[..], &accurate.shape.rods[..]);
+    relax::relax_from(scenario, start, on_grid, &mut |_| {}).map(Some)
 }
 
 /// The scenario with the loads, the wind and the rest shape at time 0.

@@ -18,6 +18,7 @@ mod order;
 mod pulses;
 mod released_rigid;
 mod released_stiff;
+mod rest_on_own_grid;
 mod stability;
 mod stiff;
 mod supports;

@@ -10,6 +10,7 @@ mod flutter;
 mod follower;
 mod hinges;
 mod lateral_buckling;
+mod load_order;
 mod map_jumps;
 mod margin_of_grips;
 mod margin_random;

@@ -4,6 +4,7 @@ mod arch;
 mod balance;
 mod base_reactions;
 mod blade;
+mod close_places;
 mod coming_to_rest;
 mod corrections;
 mod derivatives;

@@ -206,6 +206,23 @@ fn tables_of_deeplabcut_are_known_by_their_first_lines() {
         "unbend leaf.toml --shape herd.csv",
         &["herd.csv:2", "individuals"],
     );
+    // As a spreadsheet saves it.
+    let saved = video(1, "0.2").replace(',', ";").replace('.', ",");
+    place.write("saved.csv", saved);
+    let found = told(&place, "leaf.toml --shape saved.csv");
+    assert!((least(&found) / wanted - 1.0).abs() < 1e-4);
+    let lines: Vec<String> = video(1, "0.2").lines().map(String::from).collect();
+    place.write(
+        "cut.csv",
+        [&lines[0], &lines[2], &lines[3]]
+            .map(|it| it.clone())
+            .join("\n"),
+    );
+    let run = "unbend leaf.toml --shape cut.csv";
+    refused(&place, run, &["cut.csv:2", "must begin with bodyparts"]);
+    place.write("head.csv", lines[..3].join("\n"));
+    let run = "unbend leaf.toml --shape head.csv";
+    refused(&place, run, &["head.csv:3", "no row below", "frame"]);
 }
 
 #[test]
@@ -345,5 +362,110 @@ fn a_field_sheet_of_biomech_has_sections_and_weights() {
         &place,
         "unbend bare.toml --shape palm.txt --format biomech",
         &["units.length"],
+    );
+}
+
+/// A sheet in other units than m, kg and degrees is refused with the one that it was probably not written in; decimal
+/// commas are read where others divide the cells.
+#[test]
+fn a_field_sheet_in_other_units_is_refused() {
+    let place = place();
+    let sheet = example("field/palm.csv");
+    let with = |rows: &[usize], factor: f64| {
+        let mut number = 0;
+        let line = |line: &str| {
+            if line.trim().is_empty() || line.starts_with('#') {
+                return line.to_owned();
+            }
+            number += 1;
+            if !rows.contains(&(number - 1)) {
+                return line.to_owned();
+            }
+            let cell = |cell: &str| format!("{:?}", factor * cell.parse::<f64>().unwrap());
+            line.split_whitespace()
+                .map(cell)
+                .collect::<Vec<_>>()
+                .join("\t")
+        };
+        sheet.lines().map(line).collect::<Vec<_>>().join("\n")
+    };
+    place.write(
+        "palm.toml",
+        "name = \"palm\"\nunits = { length = \"m\", force = \"N\" }\n\
+         leaf = { rods = 1, length = 1.0, fan = [0.0] }\n\
+         stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = inf, shear_2 = inf, shear_3 = inf }\n",
+    );
+    let lengths = [0, 2, 3, 6, 7, 8];
+    let (sections, axis, masses) = ([2, 3], [0], [9, 10, 11]);
+    for (what, text, part) in [
+        (
+            "lengths in mm",
+            with(&lengths, 1e3),
+            "in m, and masses in kg",
+        ),
+        (
+            "lengths in cm",
+            with(&lengths, 1e2),
+            "in m, and masses in kg",
+        ),
+        (
+            "sections in mm",
+            with(&sections, 1e3),
+            "in m, and masses in kg",
+        ),
+        ("distances in cm", with(&axis, 1e2), "both are in m"),
+        ("masses in g", with(&masses, 1e3), "in m, and masses in kg"),
+        (
+            "radians",
+            with(&[4], std::f64::consts::PI / 180.0),
+            "are in degrees",
+        ),
+    ] {
+        place.write("other.txt", text);
+        let run = place
+            .run("unbend palm.toml --shape other.txt --format biomech --write none")
+            .ends(2);
+        assert!(run.err.contains(part), "{what}: {}", run.err);
+    }
+    place.write("palm.txt", &sheet);
+    place.write("commas.txt", sheet.replace('.', ","));
+    let [points, commas] = ["palm.txt", "commas.txt"].map(|file| {
+        told(
+            &place,
+            &format!("palm.toml --shape {file} --format biomech"),
+        )
+    });
+    assert_eq!(points["critical_young"], commas["critical_young"]);
+}
+
+/// Rows without a header that can be read in two ways are refused.
+#[test]
+fn rows_without_a_header_that_are_ambiguous() {
+    let place = place();
+    let comma = |value: f64| format!("{value:.3}").replace('.', ",");
+    let commas = table("", |_, [x, z]| format!("{},{}", comma(x), comma(z)));
+    place.write("commas.csv", commas);
+    let run = "unbend leaf.toml --shape commas.csv --column 1=x --column 2=z";
+    refused(
+        &place,
+        run,
+        &["commas.csv:1", "decimal commas", "semicolons"],
+    );
+    let semicolons = table("", |_, [x, z]| format!("{};{}", comma(x), comma(z)));
+    place.write("semicolons.csv", semicolons);
+    told(
+        &place,
+        "leaf.toml --shape semicolons.csv --column 1=x --column 2=z",
+    );
+    let counted = table("1,2\n", |_, [x, z]| format!("{x:.4},{z:.4}"));
+    place.write("counted.csv", counted);
+    let run = "unbend leaf.toml --shape counted.csv --column 1=x --column 2=z";
+    refused(&place, run, &["counted.csv:1", "counts the columns"]);
+    // Whole numbers of as many columns as are used.
+    let whole = table("", |_, [x, z]| format!("{:.0},{:.0}", 100.0 * x, 100.0 * z));
+    place.write("whole.csv", whole);
+    told(
+        &place,
+        "leaf.toml --shape whole.csv --column 1=x:0.01 --column 2=z:0.01",
     );
 }

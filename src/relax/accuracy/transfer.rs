@@ -114,16 +114,8 @@ impl Panel {
             let base = from.base(j);
             let first = to.base(j) + self.first(to);
             for (k, node) in nodes.iter().enumerate() {
-                // Neighbours differ by less than half a turn; more distant nodes may not.
-                let mut before = from.q[base + node.first];
-                let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-                for (i, weight) in node.terms() {
-                    let q = from.q[base + i];
-                    before = if q.dot(before) < 0.0 { -q } else { q };
-                    sum += before * weight;
-                }
                 to.x[first + k] = node.value(|i| from.x[base + i]);
-                to.q[first + k] = sum.normalize();
+                to.q[first + k] = node.rotation(|i| from.q[base + i]);
             }
             let base = j * from.segments();
             let first = j * to.segments() + self.first(to);
@@ -303,14 +295,8 @@ pub fn transfer(leaf: &DiscreteLeaf, state: &State, grid: &Grid) -> State {
     for j in 0..leaf.rods() {
         let base = state.base(j);
         for stencil in &stencils {
-            let first = state.q[base + stencil.first];
-            let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-            for (i, weight) in stencil.terms() {
-                let q = state.q[base + i];
-                sum += if q.dot(first) < 0.0 { -q } else { q } * weight;
-            }
             x.push(stencil.value(|i| state.x[base + i]));
-            q.push(sum.normalize());
+            q.push(stencil.rotation(|i| state.q[base + i]));
         }
         for &(before, next, weight) in &places {
             let [a, b] = [before, next].map(|i| state.n[j * n + i]);
@@ -387,6 +373,19 @@ impl<const MOST: usize> Stencil<MOST> {
     /// The interpolated value, or its derivative.
     pub fn value(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
         self.terms().map(|(i, weight)| weight * at(i)).sum()
+    }
+
+    /// The interpolated rotation, of quaternions with signs that are continuous from node to node: neighbours
+    /// differ by less than half a turn, more distant nodes may not.
+    pub fn rotation(&self, at: impl Fn(usize) -> DQuat) -> DQuat {
+        let mut before = at(self.first);
+        let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
+        for (i, weight) in self.terms() {
+            let q = at(i);
+            before = if q.dot(before) < 0.0 { -q } else { q };
+            sum += before * weight;
+        }
+        sum.normalize()
     }
 
     /// The stencil of the value at a fraction of the length between two kinks through nodes after the first

@@ -303,13 +303,22 @@ fn centerlines<'f>(found: &'f NestedEquilibrium, finest: &'f GridLevel) -> Drawn
     }
 }
 
+/// How much of its loads a leaf bore that did not come to rest under all of them.
+#[derive(Clone, Copy)]
+pub struct ReachedLoads {
+    /// How far the leaf came on its path, if it has one.
+    pub position: Option<PathPosition>,
+    /// The part of the loads without a potential beside all others.
+    pub borne_part: Option<f64>,
+}
+
 /// The end of a run, at rest (to the tolerance or not) or stopped before, with a remark
 /// where one helps.
 pub fn outcome(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     stopped: Option<EquilibriumFailure>,
-    reached: Option<PathPosition>,
+    reached: ReachedLoads,
 ) -> RunEnd {
     let obstacle = || obstacle_to_rest(problem, found, reached).map(Box::new);
     let segments = found.levels.last().map_or(0, |level| level.leaf.segments());
@@ -344,9 +353,11 @@ pub fn outcome(
         ),
         Some(EquilibriumFailure::NoDescent) => RunEnd::new(
             Outcome::Diverged,
-            EquilibriumRemark::NoDescent {
-                segments,
-                obstacle: obstacle(),
+            match obstacle() {
+                Some(obstacle) if obstacle.is_end_of_growth() => {
+                    EquilibriumRemark::EquilibriumEnds { segments, obstacle }
+                }
+                obstacle => EquilibriumRemark::NoDescent { segments, obstacle },
             },
         ),
         Some(EquilibriumFailure::StepLimit) if problem.out_of_time() => RunEnd::new(
@@ -383,7 +394,8 @@ pub fn outcome(
 const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 
 /// An inextensible vein that two holders, neighbours along it, keep straight. What pulls it aside
-/// would need infinite forces along it, and any force along it is in balance.
+/// would need infinite forces along it, and any force along it is in balance. A vein that shears reaches farther than it is
+/// long.
 fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
     let n = leaf.segments();
     let holders = |j: usize| {
@@ -401,7 +413,7 @@ fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
         let length: f64 = sections().map(|it| it.ds * it.rest_strain.x).sum();
         // Within a stretch that a grip holds every node is held.
         to > from + 1
-            && sections().all(|it| it.compliance.x == 0.0)
+            && sections().all(|it| it.compliance == DVec3::ZERO)
             && distance >= length * (1.0 - STRAIGHT_SPAN_TOLERANCE)
     };
     (0..leaf.rods()).find_map(|j| {
@@ -423,7 +435,7 @@ const NAMED_LOAD_FRACTION: f64 = 0.1;
 fn obstacle_to_rest(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
-    reached: Option<PathPosition>,
+    reached: ReachedLoads,
 ) -> Option<RestObstacle> {
     if let Some(slip) = probable_obstacle_to_rest(problem.leaf.scenario()) {
         return Some(RestObstacle::Implausible(slip));
@@ -434,6 +446,10 @@ fn obstacle_to_rest(
     }
     if let Some(taut) = taut_span(&level.leaf) {
         return Some(taut);
+    }
+    if let Some(part) = reached.borne_part {
+        let loads = problem.leaf.keys_without_potential();
+        return Some(RestObstacle::EndOfGrowth { part, loads });
     }
     let bends = |j: usize| {
         let base = level.state.base(j);
@@ -468,7 +484,7 @@ fn obstacle_to_rest(
     let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
     let counts = |(size, _): &&(f64, _)| *size > NAMED_LOAD_FRACTION * largest;
     Some(RestObstacle::Loads {
-        reached,
+        reached: reached.position,
         loads: named.iter().filter(counts).map(|(_, name)| *name).collect(),
         stiffness: softest,
         vein,
@@ -488,6 +504,12 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<Eq
         let strained = || stretch_doubt(scenario, rods, stations);
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
+    let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
+    let shift = scenario.place_shift * longest;
+    all.extend(EquilibriumDoubt::about_places(
+        shift,
+        leaf.accuracy.error_estimate,
+    ));
     all
 }
 

@@ -15,6 +15,7 @@ use crate::newton::{
     EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration, SolverCounts,
 };
 use crate::relax::accuracy::transfer::{GridLevel, prolong};
+use crate::relax::path::LoadOrder;
 use crate::relax::same_equilibrium::is_near_guess;
 use crate::relax::solve_on_grid::start::GridRelaxation;
 use crate::rod::{RESOLVED_TURN, Wrench};
@@ -56,6 +57,12 @@ const STEPS: StepSizes = StepSizes {
     longest: 1.0,
     growth: 2.0,
     failure: 0.5,
+};
+
+/// Steps in which the other loads are taken off and put on again.
+const OTHER_LOADS_STEPS: StepSizes = StepSizes {
+    first: 0.125,
+    ..STEPS
 };
 
 /// The accuracy of balances in wind, radians and lengths: forces are balanced to rounding, as nothing
@@ -329,55 +336,134 @@ fn grow_to_full_size(
     let drag = WithoutPotential::new(leaf).wind_forces(&rest.state);
     let drag: f64 = drag.iter().map(|force| force.length()).sum();
     let moment = leaf.leaf.moment_integral_bound() + leaf.leaf.follower_moment_bound() + drag;
-    let sizes = StepSizes {
+    let growing = StepSizes {
         first: (GROWTH.moment_per_step * softest / moment).clamp(STEPS.shortest, 1.0),
         ..STEPS
     };
+    let legs = LoadLeg::of_order(rest.load_order);
     let mut before = rest.state.clone();
     let mut error = 0.0;
-    let end = sizes.follow(|step| {
-        if rest.limit.reached() {
-            return StepEnd::Ended(EquilibriumFailure::StepLimit);
-        }
-        leaf.loads = Loads {
-            tip_moment: step.to * loads.tip_moment,
-            dead_moment_factor: step.to * loads.dead_moment_factor,
-            follower_factor: step.to * loads.follower_factor,
-            ..loads
+    let mut end = Ok(());
+    for (k, leg) in legs.iter().enumerate() {
+        let is_last = k + 1 == legs.len();
+        let sizes = match leg.grows() {
+            true => growing,
+            false => OTHER_LOADS_STEPS,
         };
-        let accuracy = match step.to < 1.0 {
-            true => GROWTH.step_accuracy,
-            false if leaf.leaf.in_wind() => WIND_ACCURACY,
-            false => rest.accuracy,
-        };
-        let forces = WithoutPotential::under_pressure(leaf, step.to);
-        let balanced = balance_within(leaf, system, &forces, rest, accuracy);
-        let way = before.distance(&rest.state);
-        match balanced {
-            Ok(remaining) if way <= GROWTH.longest_way => {
-                error = remaining;
-                before.clone_from(&rest.state);
-                StepEnd::Made {
-                    growth: STEPS.growth,
-                }
+        let mut reached = leg.from;
+        end = sizes.follow(|step| {
+            if rest.limit.reached() {
+                return StepEnd::Ended(EquilibriumFailure::StepLimit);
             }
-            failed => {
-                rest.state.clone_from(&before);
-                let stop = failed.err().unwrap_or(EquilibriumFailure::NoDescent);
-                let turn = leaf.assemble(&before, system).largest_turn;
-                let coarse = turn > GROWTH.coarse_segment_bending;
-                match (step.is_shortest, coarse) {
-                    (_, true) if step.is_shortest || stop == EquilibriumFailure::Unresolved => {
-                        StepEnd::Ended(EquilibriumFailure::Unresolved)
+            let parts = leg.at(step.to);
+            let part = parts.without_potential;
+            leaf.loads = Loads {
+                tip_moment: part * loads.tip_moment,
+                dead_moment_factor: part * loads.dead_moment_factor,
+                follower_factor: part * loads.follower_factor,
+                ..loads * parts.with_potential
+            };
+            let accuracy = match is_last && step.to == 1.0 {
+                false => GROWTH.step_accuracy,
+                true if leaf.leaf.in_wind() => WIND_ACCURACY,
+                true => rest.accuracy,
+            };
+            let forces = WithoutPotential::under_pressure(leaf, part);
+            let balanced = balance_within(leaf, system, &forces, rest, accuracy);
+            let way = before.distance(&rest.state);
+            match balanced {
+                Ok(remaining) if way <= GROWTH.longest_way => {
+                    error = remaining;
+                    reached = parts;
+                    before.clone_from(&rest.state);
+                    StepEnd::Made {
+                        growth: STEPS.growth,
                     }
-                    (true, _) => StepEnd::Ended(EquilibriumFailure::NoDescent),
-                    _ => StepEnd::TooLong(stop),
+                }
+                failed => {
+                    rest.state.clone_from(&before);
+                    let stop = failed.err().unwrap_or(EquilibriumFailure::NoDescent);
+                    let turn = leaf.assemble(&before, system).largest_turn;
+                    let coarse = turn > GROWTH.coarse_segment_bending;
+                    match (step.is_shortest, coarse) {
+                        (_, true) if step.is_shortest || stop == EquilibriumFailure::Unresolved => {
+                            StepEnd::Ended(EquilibriumFailure::Unresolved)
+                        }
+                        (true, _) => StepEnd::Ended(EquilibriumFailure::NoDescent),
+                        _ => StepEnd::TooLong(stop),
+                    }
                 }
             }
+        });
+        if end.is_err() {
+            let ends = end == Err(EquilibriumFailure::NoDescent) && reached.with_potential == 1.0;
+            rest.borne_part = Some(reached.without_potential).filter(|_| ends && leg.grows());
+            break;
         }
-    });
+    }
     leaf.loads = loads;
     end.map(|()| error)
+}
+
+/// The parts of all loads, from 0 to 1, that act on a leaf.
+#[derive(Clone, Copy)]
+struct LoadParts {
+    with_potential: f64,
+    without_potential: f64,
+}
+
+/// A part of the way from a leaf under the loads that have a potential to one under all loads.
+struct LoadLeg {
+    from: LoadParts,
+    to: LoadParts,
+}
+
+impl LoadLeg {
+    const fn new(from: [f64; 2], to: [f64; 2]) -> Self {
+        const fn parts([with_potential, without_potential]: [f64; 2]) -> LoadParts {
+            LoadParts {
+                with_potential,
+                without_potential,
+            }
+        }
+        LoadLeg {
+            from: parts(from),
+            to: parts(to),
+        }
+    }
+
+    /// The way in this order.
+    fn of_order(order: LoadOrder) -> &'static [LoadLeg] {
+        match order {
+            LoadOrder::PotentialFirst => const { &[LoadLeg::new([1.0, 0.0], [1.0, 1.0])] },
+            LoadOrder::PotentialLast => {
+                const {
+                    &[
+                        LoadLeg::new([1.0, 0.0], [0.0, 0.0]),
+                        LoadLeg::new([0.0, 0.0], [0.0, 1.0]),
+                        LoadLeg::new([0.0, 1.0], [1.0, 1.0]),
+                    ]
+                }
+            }
+        }
+    }
+
+    /// Whether the loads without a potential grow.
+    fn grows(&self) -> bool {
+        self.to.without_potential > self.from.without_potential
+    }
+
+    /// The loads at a part of this way.
+    fn at(&self, lambda: f64) -> LoadParts {
+        let between = |of: fn(&LoadParts) -> f64| match of(&self.from) == of(&self.to) {
+            true => of(&self.to),
+            false => of(&self.from) + lambda * (of(&self.to) - of(&self.from)),
+        };
+        LoadParts {
+            with_potential: between(|it| it.with_potential),
+            without_potential: between(|it| it.without_potential),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ use crate::relax::accuracy::{
     History, NestedEquilibrium, RelaxationFailure, StrainEffects, is_large,
 };
 use crate::relax::log::WorkLog;
-use crate::relax::path::{Event, Route};
+use crate::relax::path::{Event, LoadOrder, Route};
 use crate::relax::plan::{GRIDS, RelaxationProblem, ValleyPolicy, WORK, WayFromStart};
 use crate::relax::request::{MAX_NODES, Options, Progress, RelaxError};
 use crate::relax::saddle;
@@ -220,6 +220,7 @@ fn find_unleaned_equilibrium(
     let mut relaxation = GridRelaxation {
         near_rest,
         left_convex_valley: moved,
+        load_order: problem.load_order,
         ..GridRelaxation::new(state, accuracy, work, progress, limit)
     };
     let rest = match (explicit, dead_moment) {
@@ -254,8 +255,14 @@ fn find_unleaned_equilibrium(
     let GridRelaxation {
         state,
         left_convex_valley: moved,
+        borne_part,
         ..
     } = relaxation;
+    let has_grown = grows && rest.is_ok() && problem.load_order == LoadOrder::PotentialFirst;
+    effort.borne_part = match has_grown {
+        true => None,
+        false => borne_part.or(effort.borne_part),
+    };
     if explicit || windy {
         history.iteration_error = history.iteration_error.max(rest.unwrap_or(0.0));
     }

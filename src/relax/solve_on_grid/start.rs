@@ -3,6 +3,7 @@
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::newton::{DefiniteSolver, SolverCounts};
+use crate::relax::path::LoadOrder;
 use crate::rotation;
 use crate::run::Limit;
 use glam::DVec3;
@@ -170,6 +171,11 @@ pub struct GridRelaxation<'a> {
     pub most_evaluations: usize,
     /// Whether to fail at once where the energy is not convex.
     pub convex_only: bool,
+    /// When loads without a potential grow.
+    pub load_order: LoadOrder,
+    /// The part of the loads without a potential that the leaf bears beside all others, where they could not
+    /// grow farther.
+    pub borne_part: Option<f64>,
 }
 
 impl<'a> GridRelaxation<'a> {
@@ -194,6 +200,8 @@ impl<'a> GridRelaxation<'a> {
             solver: DefiniteSolver::default(),
             most_evaluations: usize::MAX,
             convex_only: false,
+            load_order: LoadOrder::default(),
+            borne_part: None,
         }
     }
 }

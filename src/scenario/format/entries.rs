@@ -9,6 +9,7 @@ use crate::scenario::format::error::{
     ScenarioError, ScenarioResult, SourceLocation, shorten_excerpt,
 };
 use crate::scenario::format::path::{EntryPath, nearest_key};
+use crate::scenario::format::places::CommonPlaces;
 use crate::scenario::format::source::{
     ParsedText, ScenarioSource, entry_span, multiply_numbers, number_of_value, parse_value,
     toml_error_message, value_from_parsed,
@@ -38,6 +39,8 @@ pub struct Entries {
     entries: [Vec<Option<Arc<Entry>>>; Key::COUNT],
     /// How many there are of each table of [`Key::REPEATED_TABLES`].
     rows: [usize; Key::REPEATED_TABLES.len()],
+    /// What places along the veins are read as, if some are so close that they are one.
+    common_places: Option<Arc<CommonPlaces>>,
     pub(in crate::scenario) source: Arc<ScenarioSource>,
 }
 
@@ -97,6 +100,7 @@ impl Entries {
         let mut entries = Entries {
             entries: [const { Vec::new() }; Key::COUNT],
             rows: [0; Key::REPEATED_TABLES.len()],
+            common_places: None,
             source: source.into(),
         };
         let mut unknown = Vec::new();
@@ -188,6 +192,26 @@ impl Entries {
             entries.put_entry(part, value, Some(given.clone()));
         }
         Ok(entries)
+    }
+
+    /// These entries with close places along the veins made one.
+    pub(in crate::scenario) fn with_common_places(&self) -> Self {
+        Entries {
+            common_places: CommonPlaces::of_entries(self).map(Arc::new),
+            ..self.clone()
+        }
+    }
+
+    /// What a place along a vein is read as.
+    pub(super) fn common_place(&self, at: f64) -> f64 {
+        let common = self.common_places.as_ref();
+        common.map_or(at, |places| places.common_place(at))
+    }
+
+    /// The largest difference between a place along a vein and what it is read as.
+    pub(in crate::scenario) fn largest_place_shift(&self) -> f64 {
+        let common = self.common_places.as_ref();
+        common.map_or(0.0, |places| places.largest_shift())
     }
 
     /// The text that the entries are from, without overrides.

@@ -4,6 +4,7 @@
 use crate::scenario::format::entries::{Entries, WrittenEntry};
 use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten_excerpt};
 use crate::scenario::format::path::EntryPath;
+use crate::scenario::format::places::SAME_PLACE_DISTANCE;
 use crate::scenario::format::source::{intended_number, number_of_value};
 use crate::scenario::format::{Key, MissingKeyRule, NumberRange, TablePath, ValueSchema};
 use crate::scenario::profile::Profile;
@@ -336,7 +337,7 @@ impl<'e> EntryValue<'e> {
             return Ok(numbers.into_iter().map(Profile::Constant).collect());
         }
         let [at, value] = self.knots_and_values("value", PROFILE_FORM)?;
-        let at = at.increasing_numbers(self.profile_knots())?;
+        let at = at.profile_knots()?;
         let needed = format!("a list of numbers, or a list of {rods} such lists (one per rod)");
         let mut list = value.list_entries(&needed)?;
         if (list.next()).is_none_or(|first| !first.value.is_array()) {
@@ -346,13 +347,16 @@ impl<'e> EntryValue<'e> {
         lists.map(|list| list.linear_profile(&at)).collect()
     }
 
-    /// What the knots of a profile of this key may be: a blade, whose veins and tissue follow from one
-    /// smooth surface, has no steps.
-    fn profile_knots(&self) -> KnotKind {
-        match self.key().table() {
-            "blade" => KnotKind::Fractions,
-            _ => KnotKind::FractionsWithSteps,
+    /// The knots of a profile along the veins, close ones of all that is read here made equal: a ramp as short as that
+    /// is a step. Blades, whose veins and tissue follow from one smooth surface, have no steps, and
+    /// fractions of their own length.
+    fn profile_knots(&self) -> ScenarioResult<Vec<f64>> {
+        if self.key().table() == "blade" {
+            return self.increasing_numbers(KnotKind::Fractions);
         }
+        let at = self.increasing_numbers(KnotKind::FractionsWithSteps)?;
+        let common = at.iter().map(|&at| self.entries.common_place(at));
+        Ok(common.collect())
     }
 
     /// The knots of a profile along the leaf, without steps.
@@ -378,8 +382,48 @@ impl<'e> EntryValue<'e> {
         let value = values
             .map(|item| item.number_in(range))
             .collect::<ScenarioResult<_>>()?;
-        let at = at.to_vec();
-        Ok(Profile::Linear { at, value })
+        self.profile_through(at, value)
+    }
+
+    /// The profile through values at knots, of which those that are equal after the first and before the last
+    /// are passed on the way of a step: they lie between the values on both sides of it.
+    fn profile_through(&self, at: &[f64], value: Vec<f64>) -> ScenarioResult<Profile> {
+        let (mut knots, mut values): (Vec<f64>, Vec<f64>) = (Vec::new(), Vec::new());
+        let mut first = 0;
+        while first < at.len() {
+            let equal = at[first..].iter().take_while(|&&next| next == at[first]);
+            let last = first + equal.count() - 1;
+            let ends = [value[first], value[last]];
+            let between = ends[0].min(ends[1])..=ends[0].max(ends[1]);
+            let beyond = (first..=last).find(|&k| !between.contains(&value[k]));
+            if let Some(beyond) = beyond {
+                let problem = format_args!(
+                    "is reached and left within {SAME_PLACE_DISTANCE:e} of the length, which is one place: give the \
+                     stretch that has this value more length"
+                );
+                return Err(self.entry(beyond).value_error(problem));
+            }
+            // A step at an end of the vein has one side.
+            let sides = match at[first] {
+                _ if first == last => first..=first,
+                0.0 => last..=last,
+                1.0 => first..=first,
+                here => {
+                    knots.push(here);
+                    values.push(value[first]);
+                    last..=last
+                }
+            };
+            for k in sides {
+                knots.push(at[k]);
+                values.push(value[k]);
+            }
+            first = last + 1;
+        }
+        Ok(Profile::Linear {
+            at: knots,
+            value: values,
+        })
     }
 
     /// A factor that may change in time.
@@ -574,16 +618,17 @@ impl<'e> EntryValue<'e> {
             return Ok(each.map(|of| of.map(Profile::Constant)).collect());
         }
         let [at, value] = self.knots_and_values("value", VECTOR_PROFILE_FORM)?;
-        let at = at.increasing_numbers(self.profile_knots())?;
+        let at = at.profile_knots()?;
         let profiles = |list: EntryValue| -> ScenarioResult<[Profile; 3]> {
             let each = list.list_of_length(at.len(), ONE_PER_KNOT, VECTORS)?;
             let each: Vec<[f64; 3]> = each
                 .map(|item| item.vector())
                 .collect::<ScenarioResult<_>>()?;
-            Ok([0, 1, 2].map(|axis| Profile::Linear {
-                at: at.clone(),
-                value: each.iter().map(|vector| vector[axis]).collect(),
-            }))
+            let along = |axis: usize| {
+                let values = each.iter().map(|vector| vector[axis]).collect();
+                list.profile_through(&at, values)
+            };
+            Ok([along(0)?, along(1)?, along(2)?])
         };
         let vector = value.value.get(0).and_then(|first| first.get(0));
         match vector.is_some_and(|component| component.is_array()) {
@@ -664,6 +709,13 @@ impl<'e> EntryValue<'e> {
             at > 0.0 && at <= 1.0,
             "must be greater than 0 (the base) and at most 1 (the tip): a fraction of the length",
         )?;
+        let at = self.entries.common_place(at);
+        self.refuse_unless(
+            at > 0.0,
+            format_args!(
+                "is within {SAME_PLACE_DISTANCE:e} of the base, which is held: leave it out, or move it towards the tip"
+            ),
+        )?;
         Ok(at)
     }
 
@@ -676,6 +728,14 @@ impl<'e> EntryValue<'e> {
         let mut ends = self.list_of_length(2, "where the stretch begins and ends", needed)?;
         let mut next = || ends.next().map_or(Ok(0.0), |item| item.fraction());
         let [from, to] = [next()?, next()?];
+        let written = [0, 1].map(|k| self.entry(k).number().unwrap_or(f64::NAN));
+        self.refuse_unless(
+            from < to || written[0] >= written[1],
+            format_args!(
+                "is shorter than {SAME_PLACE_DISTANCE:e} of the length: give one place, with held = \"clamped\" if the \
+                 directions are held, or a longer stretch"
+            ),
+        )?;
         self.refuse_unless(from < to, "must rise from the base to the tip")?;
         Ok([from, to])
     }

@@ -8,6 +8,7 @@ pub(super) mod entries;
 pub(super) mod error;
 pub(super) mod item;
 pub(super) mod path;
+pub(super) mod places;
 pub(super) mod schema;
 pub(super) mod source;
 pub mod units;

@@ -151,6 +151,9 @@ impl<'t> DataTable<'t> {
             .collect();
         let units = table.remove_unit_row();
         table.check_cells()?;
+        if is_numbered {
+            table.check_numbered_cells(reading, lines.separator)?;
+        }
         let unused = table.select_columns(reading, columns)?;
         let ats: Vec<usize> = table.sources.iter().map(|source| source.at).collect();
         table
@@ -274,6 +277,54 @@ impl<'t> DataTable<'t> {
                 );
                 return Err(line_error(self.file, row.number, why));
             }
+        }
+        Ok(())
+    }
+
+    /// Refuses rows without a header that can be read in two ways: a first row that counts the columns, and whole numbers
+    /// that are numbers with decimal commas, each divided in two.
+    fn check_numbered_cells(
+        &self,
+        reading: &DataFileOptions,
+        separator: &str,
+    ) -> Result<(), FitError> {
+        let width = self.names.len();
+        let Some((first, others)) = self.rows.split_first() else {
+            return Ok(());
+        };
+        let counts_from = |start: usize| {
+            let mut cells = first.cells().enumerate();
+            cells.all(|(k, cell)| cell == (start + k).to_string())
+        };
+        let is_fraction = |cell: &str| cell.contains(['.', ',']);
+        let fractions = others.iter().any(|row| row.cells().any(is_fraction));
+        if width > 1 && fractions && (counts_from(0) || counts_from(1)) {
+            let why = "counts the columns, or is a row of numbers: leave the line out, or write it as the others, \
+                       with decimals";
+            return Err(line_error(self.file, first.number, why));
+        }
+        let is_digits =
+            |cell: &str| !cell.is_empty() && cell.bytes().all(|byte| byte.is_ascii_digit());
+        let is_divided = |row: &TableLine| {
+            let mut cells = row.cells().enumerate();
+            cells.all(|(k, cell)| match k % 2 {
+                0 => is_digits(cell.strip_prefix(['-', '+']).unwrap_or(cell)),
+                _ => is_digits(cell),
+            })
+        };
+        let numbers = reading
+            .columns
+            .iter()
+            .filter_map(|map| map.name.parse().ok());
+        let last: usize = numbers.max().unwrap_or(0);
+        let half = width / 2;
+        let may_be_divided = separator == "commas" && 2 * half == width && last <= half;
+        if may_be_divided && self.rows.iter().all(is_divided) {
+            let why = format!(
+                "has {width} whole numbers in a row, or {half} with decimal commas: divide cells with decimal commas by \
+                 semicolons or tabs, and of whole numbers leave out the columns that are not used"
+            );
+            return Err(line_error(self.file, first.number, why));
         }
         Ok(())
     }

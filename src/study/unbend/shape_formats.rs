@@ -23,6 +23,9 @@ words! {
 /// Points of which DeepLabCut is less sure are left out, as by its own default (`pcutoff`).
 const LEAST_LIKELIHOOD: f64 = 0.6;
 
+/// What the first lines of a table of DeepLabCut begin with.
+const HEADS: [&str; 3] = ["scorer", "bodyparts", "coords"];
+
 /// The points in a table of DeepLabCut.
 pub(super) struct VideoPoints {
     /// A table with a row a point: `frame`, `bodypart`, `pixel_x`, `pixel_y`.
@@ -38,19 +41,29 @@ pub(super) struct VideoPoints {
 /// # Errors
 /// Several animals, or rows that are no such table.
 pub(super) fn deeplabcut_points(text: &str, file: &str) -> Result<Option<VideoPoints>, FitError> {
+    let first = text.lines().next().unwrap_or_default();
+    let is_scorer = |mark: &char| first.split(*mark).next().map(str::trim) == Some(HEADS[0]);
+    // Spreadsheets save the table with other marks between the cells.
+    let Some(mark) = [',', ';', '\t'].into_iter().find(is_scorer) else {
+        return Ok(None);
+    };
+    let divided =
+        |line: &str| -> Vec<String> { line.split(mark).map(|cell| cell.trim().into()).collect() };
     let mut lines = text.lines().enumerate();
-    let mut heads: Vec<Vec<&str>> = Vec::new();
-    for name in ["scorer", "bodyparts", "coords"] {
-        let Some((k, line)) = lines.next() else {
-            return Ok(None);
-        };
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+    let mut heads: Vec<Vec<String>> = Vec::new();
+    for name in HEADS {
+        let (k, line) = lines.next().unwrap_or((heads.len(), ""));
+        let cells = divided(line);
         if cells[0] == "individuals" {
             let why = "names individuals: give the table of one of them, without this line";
             return Err(line_error(file, k + 1, why));
         }
         if cells[0] != name {
-            return Ok(None);
+            let why = format!(
+                "must begin with {name}: a table of DeepLabCut has the lines {}, and a row for each frame below",
+                HEADS.join(", ")
+            );
+            return Err(line_error(file, k + 1, why));
         }
         heads.push(cells);
     }
@@ -61,21 +74,24 @@ pub(super) fn deeplabcut_points(text: &str, file: &str) -> Result<Option<VideoPo
     };
     let mut named: Vec<&str> = Vec::new();
     for part in parts.iter().skip(1).filter(|part| !part.is_empty()) {
-        if !named.contains(part) {
+        if !named.contains(&part.as_str()) {
             named.push(part);
         }
     }
     let mut table = String::from("frame,bodypart,pixel_x,pixel_y\n");
     let mut frames = 0;
     for (k, line) in lines.filter(|(_, line)| !line.trim().is_empty()) {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        let cells = match mark {
+            ',' => divided(line),
+            _ => divided(&line.replace(',', ".")),
+        };
         frames += 1;
         for part in &named {
             let [Some(x), Some(y)] = ["x", "y"].map(|name| column(part, name)) else {
                 let why = format!("{part} has no columns x and y");
                 return Err(line_error(file, 3, why));
             };
-            let cell = |at: usize| cells.get(at).copied().unwrap_or("");
+            let cell = |at: usize| cells.get(at).map_or("", String::as_str);
             let number = |at: usize| cell(at).parse::<f64>().ok().filter(|it| it.is_finite());
             let likelihood = column(part, "likelihood").and_then(number);
             if likelihood.is_some_and(|likelihood| likelihood < LEAST_LIKELIHOOD) {
@@ -99,6 +115,10 @@ pub(super) fn deeplabcut_points(text: &str, file: &str) -> Result<Option<VideoPo
                 }
             }
         }
+    }
+    if frames == 0 {
+        let why = "has no row below its three lines: a row of a table of DeepLabCut is a frame";
+        return Err(line_error(file, HEADS.len(), why));
     }
     Ok(Some(VideoPoints {
         table,

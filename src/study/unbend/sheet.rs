@@ -1,5 +1,6 @@
 //! Field sheets of biomech: where stations of a leaf's axis are, their sections, and the mass that they carry.
 
+use crate::numbers::format_two_digits;
 use crate::posture::points::PosturePoints;
 use crate::scenario::{Scenario, SectionConstants, SectionOutline};
 use crate::study::fit::cells::line_error;
@@ -64,11 +65,16 @@ const OUTLINES: [SectionOutline; 5] = [
 /// What is no such sheet, with the line.
 pub(super) fn read_field_sheet(text: &str, file: &str) -> Result<FieldSheet, FitError> {
     let mut rows: Vec<(usize, Vec<f64>)> = Vec::new();
+    let decimal_commas = has_decimal_commas(text);
     for (k, line) in text.lines().enumerate() {
         let line = line.trim();
         if line.is_empty() || line.starts_with('#') {
             continue;
         }
+        let line = match decimal_commas {
+            true => line.replace(',', "."),
+            false => line.to_owned(),
+        };
         let cells = line.split(|mark: char| mark.is_whitespace() || mark == ';' || mark == ',');
         let cells: Vec<&str> = cells.filter(|cell| !cell.is_empty()).collect();
         let number = |cell: &&str| {
@@ -151,10 +157,101 @@ pub(super) fn read_field_sheet(text: &str, file: &str) -> Result<FieldSheet, Fit
             mass: cell(9, k) + cell(10, k) + cell(11, k),
         });
     }
-    Ok(FieldSheet {
+    let sheet = FieldSheet {
         stations,
         inclination: cell(4, 0).to_radians(),
-    })
+    };
+    if let Some(why) = sheet.implausible_unit() {
+        return Err(line_error(file, rows[0].0, why));
+    }
+    Ok(sheet)
+}
+
+/// Whether the commas of a sheet are those of decimals: all stand between digits, and others divide the cells.
+fn has_decimal_commas(text: &str) -> bool {
+    let lines = text.lines().map(str::trim);
+    let lines = lines.filter(|line| !line.is_empty() && !line.starts_with('#'));
+    let mut any = false;
+    for line in lines {
+        let cells = line.split(|mark: char| mark.is_whitespace() || mark == ';');
+        for cell in cells.filter(|cell| !cell.is_empty()) {
+            let Some((whole, decimals)) = cell.split_once(',') else {
+                continue;
+            };
+            let is_digits =
+                |part: &str| !part.is_empty() && part.bytes().all(|it| it.is_ascii_digit());
+            if cell.contains('.')
+                || !is_digits(whole.trim_start_matches('-'))
+                || !is_digits(decimals)
+            {
+                return false;
+            }
+            any = true;
+        }
+    }
+    any
+}
+
+/// Mass over the volume of the boxes around the sections, in kg/m^3, that a plant may have with what it carries: pith has 20, green wood
+/// 1000, and leaflets or fruit many times the mass of their axis. Grams in place of kilograms are a thousand
+/// times as many, centimeters in place of meters a million times as few.
+const PLAUSIBLE_DENSITIES: std::ops::RangeInclusive<f64> = 2.0..=5e4;
+
+/// Largest ratio of the way between positions to that along the axis, or the inverse.
+const LARGEST_WAY_RATIO: f64 = 3.0;
+
+/// Differences of the inclination at the base from that of the way to the next station, in degrees: up to
+/// the first a number that is taken for radians agrees with it, from the second on one of degrees does not.
+const INCLINATION_DIFFERENCES: [f64; 2] = [15.0, 30.0];
+
+impl FieldSheet {
+    /// Which of its units are probably not those of a field sheet.
+    fn implausible_unit(&self) -> Option<String> {
+        let (mut volume, mut mass, mut before) = (0.0, 0.0, 0.0);
+        for station in &self.stations {
+            volume += station.width * station.height * (station.distance - before);
+            mass += station.mass;
+            before = station.distance;
+        }
+        let density = mass / volume;
+        if volume > 0.0 && mass > 0.0 && !PLAUSIBLE_DENSITIES.contains(&density) {
+            return Some(format!(
+                "the masses over width, height and distance are {} kg/m³: distances and sections of a field sheet are in \
+                 m, and masses in kg",
+                format_two_digits(density)
+            ));
+        }
+        let positions = self
+            .stations
+            .iter()
+            .map(|it| DVec3::from_array(it.position));
+        let positions: Vec<DVec3> = positions.collect();
+        let [first, .., last] = &self.stations[..] else {
+            return None;
+        };
+        let way: f64 = positions
+            .windows(2)
+            .map(|pair| pair[0].distance(pair[1]))
+            .sum();
+        let ratio = way / (last.distance - first.distance);
+        if !(1.0 / LARGEST_WAY_RATIO..=LARGEST_WAY_RATIO).contains(&ratio) {
+            return Some(format!(
+                "the way from position to position is {} times that by the distances: both are in m",
+                format_two_digits(ratio)
+            ));
+        }
+        let chord = positions[1] - positions[0];
+        let rise = chord.z.atan2(chord.truncate().length()).to_degrees();
+        let given = self.inclination.to_degrees();
+        let [near, far] = INCLINATION_DIFFERENCES;
+        if (given - rise).abs() > far && (given.to_degrees() - rise).abs() < near {
+            return Some(format!(
+                "inclination = {given:.2}, and the way to the next station rises by {rise:.0} degrees: inclinations are \
+                 in degrees"
+            ));
+        }
+        None
+    }
 }
 
 /// Standard gravity, in m/s^2.

@@ -1,0 +1,67 @@
+//! A leaf that starts at rest stays where it is: it rests by the equations of the grid on which it moves, also where
+//! the way there is too far for that grid.
+
+use leafdyn::simulate::{Options, Scheme, Simulation, SimulationError};
+use leafdyn_testing::motion::*;
+use leafdyn_testing::*;
+
+/// Sheds everything but what a rod is; units of its own.
+fn rod(rest: &str, more: &str) -> Scenario {
+    parse(&format!(
+        "name = 'rod'\nleaf = {{ rods = 1, length = 1.0, fan = [-0.0519] }}\n\
+         stiffness = {{ torsion = 0.9, bending_2 = 0.7, bending_3 = 1.0, axial = 900.0, shear_2 = inf, shear_3 = inf }}\n\
+         rest = {{ {rest} }}\ndynamics = {{ start = \"at-rest\", duration = 0.05, output_interval = 0.025 }}\n{more}"
+    ))
+}
+
+/// How far the leaf moves from where it starts, and on how many segments.
+fn moves(leaf: &Scenario, options: &Options) -> Result<(f64, usize), SimulationError> {
+    let mut simulation = Simulation::new(leaf, options)?;
+    let start = simulation.frame().positions;
+    while !simulation.done() {
+        simulation.next_frame().unwrap();
+    }
+    let end = simulation.frame().positions;
+    let way = start.iter().zip(&end).map(|(a, b)| a.distance(*b));
+    Ok((largest(way), simulation.segments()))
+}
+
+const TIP: &str = "load = { tip_force = [0.3, 0.2, -0.5] }";
+
+/// Also on grids that are no multiples of that on which the leaf was loaded slowly, with turns between their nodes that
+/// are large together.
+#[test]
+fn wound_rods_stay_at_rest() {
+    for rest in [
+        "twist = 10.0",
+        "twist = 20.0",
+        "twist = -50.0",
+        "bend_2 = 20.0",
+    ] {
+        let leaf = rod(rest, TIP);
+        let (way, _) = moves(&leaf, &moving(Scheme::SemiImplicit, None)).unwrap();
+        assert!(way < 1e-9, "{rest}: {way:.1e}");
+    }
+    for segments in [20, 37, 64] {
+        let leaf = rod("twist = 20.0", TIP);
+        let options = moving(Scheme::SemiImplicit, Some(segments));
+        let (way, on) = moves(&leaf, &options).unwrap();
+        assert!(way < 1e-9 && on == segments, "{segments}: {way:.1e}");
+    }
+}
+
+/// A rod that is pushed together between holders rests on finer grids alone: it moves on one of them, and on a coarse
+/// one that is asked for it is refused with what to do.
+#[test]
+fn what_rests_on_finer_grids_alone_moves_on_them() {
+    let held = "[tip]\nheld = 'pinned'\nposition = [0.713, 0.0, 0.0]\n[[grip]]\nvein = 1\nat = [0.727, 0.926]";
+    let leaf = rod("bend_2 = 0.0", held);
+    let (way, segments) = moves(&leaf, &moving(Scheme::SemiImplicit, None)).unwrap();
+    assert!(way < 1e-8 && segments > 16, "{segments}: {way:.1e}");
+    let coarse = moves(&leaf, &moving(Scheme::SemiImplicit, Some(16)));
+    let why = coarse.unwrap_err().to_string();
+    assert!(
+        why.contains("on 16 segments") && why.contains("give more segments"),
+        "{why}"
+    );
+}
