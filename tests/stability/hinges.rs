@@ -440,7 +440,11 @@ fn counts_of_veins_held_in_several_ways_are_those_of_the_dense_matrix() {
         let what = format!("{held} {entries}: {values}");
         assert_eq!(zero, found.stability.neutral_directions, "{what}");
         let negative = count(&|value| value <= -1e-5);
-        assert_eq!(found.stability.negative_eigenvalues, Some(negative), "{what}");
+        assert_eq!(
+            found.stability.negative_eigenvalues,
+            Some(negative),
+            "{what}"
+        );
         seen.push(zero);
     }
     assert_eq!(seen[..4], [1, 1, 0, 0], "{seen:?}");
