@@ -312,14 +312,7 @@ impl<'a, const N: usize> Leaves<'a, N> {
 /// Puts the bases of all rods where the leaf holds them, and held tips where it holds them.
 pub(super) fn place_supports(leaf: &DiscreteLeaf, state: &mut State) {
     leaf.place_held_nodes(state);
-    for j in 0..leaf.rods() {
-        let base = state.base(j);
-        let pose = leaf.leaf.base_pose(j);
-        state.x[base] = pose.position;
-        if !leaf.leaf.hinged() {
-            state.q[base] = pose.rotation;
-        }
-    }
+    leaf.leaf.place_held_bases(state);
 }
 
 /// At most `MOST` values by key, the most recently used first.

@@ -48,7 +48,8 @@ impl DiscreteLeaf {
     pub(super) fn springs_from(&self, natural: &State) -> NodeSprings {
         let mut springs = Vec::new();
         if self.leaf.has_base_springs() {
-            springs.extend((0..self.rods()).map(|j| NodeSpring {
+            let elastic = (0..self.rods()).filter(|j| self.leaf.base_turn_stiffness(*j) > 0.0);
+            springs.extend(elastic.map(|j| NodeSpring {
                 turn_stiffness: self.leaf.base_turn_stiffness(j),
                 ..self.slack_spring(natural, j, 0)
             }));
@@ -156,6 +157,21 @@ impl DiscreteLeaf {
             let natural = leaf.base_pose(spring.rod).rotation;
             spring.rotation = (turn * natural).normalize();
         }
+    }
+
+    /// Moves the springs of a grip on node `k`, rod after rod, to this place.
+    pub fn move_grip_springs(&mut self, k: usize, grip: usize, position: DVec3) {
+        let springs = self.springs.on_node_mut(k).iter_mut();
+        for spring in springs.filter(|spring| spring.grip == Some(grip)) {
+            spring.position = position;
+        }
+    }
+
+    /// What the springs of a grip on node `k`, rod after rod, exert on the grip with the node at `x`.
+    pub fn grip_spring_force(&self, k: usize, grip: usize, x: DVec3) -> DVec3 {
+        let springs = self.springs.on_node(k).iter();
+        let own = springs.filter(|spring| spring.grip == Some(grip));
+        -own.map(|spring| spring.force(x)).sum::<DVec3>()
     }
 
     /// The ends of the springs of grips that would have no force in a state.

@@ -55,24 +55,11 @@ impl Leaf {
 
     /// The loads on points that turn with the section.
     fn point_followers(&self) -> impl Iterator<Item = PointFollower> {
-        let (s, scale) = (self.scenario(), self.scale);
-        let points = s.points.iter().filter(|it| it.follows);
-        points.map(move |it| {
-            let force = DVec3::from_array(it.force) / scale.force();
-            let moment = DVec3::from_array(it.moment) / scale.moment();
-            PointFollower {
-                rod: it.vein,
-                sigma: it.at,
-                load: FollowerLoad {
-                    force,
-                    // Of a force that turns with the section the lever does, too.
-                    moment: match it.is_off_axis() {
-                        true => moment + self.point_offset(it).cross(force),
-                        false => moment,
-                    },
-                    dead_moment: DVec3::ZERO,
-                },
-            }
+        let points = self.scenario().points.iter().filter(|it| it.follows);
+        points.map(move |it| PointFollower {
+            rod: it.vein,
+            sigma: it.at,
+            load: self.load_on_turning_point(it, it.force, it.moment),
         })
     }
 
@@ -97,6 +84,26 @@ impl Leaf {
         ];
         let acting = keys.into_iter().filter(|(acts, _)| *acts);
         acting.map(|(_, key)| key).collect()
+    }
+
+    /// A force and a moment on a point that turn with the section there.
+    pub(super) fn load_on_turning_point(
+        &self,
+        point: &PointLoad,
+        force: [f64; 3],
+        moment: [f64; 3],
+    ) -> FollowerLoad {
+        let force = DVec3::from_array(force) / self.scale.force();
+        let moment = DVec3::from_array(moment) / self.scale.moment();
+        FollowerLoad {
+            force,
+            // Of a force that turns with the section the lever does, too.
+            moment: match point.is_off_axis() {
+                true => moment + self.point_offset(point).cross(force),
+                false => moment,
+            },
+            dead_moment: DVec3::ZERO,
+        }
     }
 
     /// Upper bound on the integral along any rod of the moment by these loads alone, as if all acted on
@@ -126,25 +133,34 @@ impl DiscreteLeaf {
     /// The loads without a potential on all nodes, rod after rod, before their factor; empty if there are
     /// none.
     pub(super) fn nodal_followers(&self) -> Vec<FollowerLoad> {
-        if !self.leaf.scenario().has_followers() {
-            return Vec::new();
+        match self.leaf.scenario().has_followers() {
+            true => self.followers_on_nodes(&self.leaf),
+            false => Vec::new(),
         }
+    }
+
+    /// The loads without a potential of a leaf on all nodes of this grid, rod after rod.
+    pub(super) fn followers_on_nodes(&self, leaf: &Leaf) -> Vec<FollowerLoad> {
         let n = self.segments();
         let node = |(j, i)| {
-            let density = |place| self.leaf.follower_density(j, place);
+            let density = |place| leaf.follower_density(j, place);
             self.grid.node_integral(i, density)
         };
         let mut loads: Vec<FollowerLoad> = self.rod_index_pairs(0..n + 1).map(node).collect();
-        for PointFollower { rod, sigma, load } in self.leaf.point_followers() {
+        for PointFollower { rod, sigma, load } in leaf.point_followers() {
             let node = &mut loads[rod * (n + 1) + self.grid.nearest_node(sigma)];
             *node = *node + load;
         }
         loads
     }
 
-    /// Whether loads act that turn with the sections, or moments along veins.
+    /// Whether loads act that turn with the sections, or moments along veins, if only at other times.
     pub fn has_followers(&self) -> bool {
-        !self.followers.is_empty() && self.follower_factor() != 0.0
+        let vary = || {
+            let scheduled = self.scheduled_loads.as_ref();
+            scheduled.is_some_and(|it| !it.followers.is_empty())
+        };
+        self.follower_factor() != 0.0 && (!self.followers.is_empty() || vary())
     }
 
     fn follower_factor(&self) -> f64 {

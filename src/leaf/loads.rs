@@ -6,7 +6,9 @@
 
 use crate::leaf::block_tridiagonal::rod_lane;
 use crate::leaf::discrete::{DiscreteLeaf, Grid};
-use crate::leaf::nodal_loads::{Lever, NodalMoment, ScheduledForce, ScheduledLoads};
+use crate::leaf::nodal_loads::{
+    FollowerLoad, Lever, NodalMoment, ScheduledFollower, ScheduledForce, ScheduledLoads,
+};
 use crate::leaf::state::State;
 use crate::leaf::system::System;
 use crate::leaf::{Leaf, Loads};
@@ -126,6 +128,7 @@ impl DiscreteLeaf {
                 let none = own.unloaded();
                 own.own_gravity = none.own_gravity;
                 (own.gravity, own.g, own.distributed) = (none.gravity, none.g, none.distributed);
+                (own.follower, own.couple) = (None, None);
             }
             let varying = own.points.iter_mut().filter(|it| it.in_time.is_some());
             varying.for_each(|it| (it.force, it.moment) = ([0.0; 3], [0.0; 3]));
@@ -136,6 +139,10 @@ impl DiscreteLeaf {
             constant_forces: self.nodal_own_loads(&constant),
             constant_moments: self.nodal_moments(constant_points).collect(),
             constant_levers: self.nodal_levers(&constant),
+            constant_followers: match scenario.has_followers_in_time() {
+                true => self.followers_on_nodes(&constant),
+                false => Vec::new(),
+            },
             ..ScheduledLoads::default()
         };
         if let Some(loads) = &scenario.factored {
@@ -144,7 +151,10 @@ impl DiscreteLeaf {
                 own.own_gravity.clone_from(&loads.own_gravity);
                 own.g = loads.g;
                 own.distributed.clone_from(&loads.distributed);
-                own.points.iter_mut().for_each(|it| it.force = [0.0; 3]);
+                own.follower.clone_from(&loads.follower);
+                own.couple.clone_from(&loads.couple);
+                let points = own.points.iter_mut();
+                points.for_each(|it| (it.force, it.moment) = ([0.0; 3], [0.0; 3]));
             });
             let forces = self.nodal_own_loads(&whole).into_iter();
             let nodes = self.rod_index_pairs(0..n + 1).zip(forces);
@@ -159,10 +169,32 @@ impl DiscreteLeaf {
                 .collect();
             let levers = self.nodal_levers(&whole).into_iter();
             scheduled.levers = levers.map(|lever| (0, lever)).collect();
+            if loads.follower.is_some() || loads.couple.is_some() {
+                let followers = self.followers_on_nodes(&whole);
+                let nodes = self.rod_index_pairs(0..n + 1).zip(followers);
+                let acting = nodes.filter(|(_, load)| *load != FollowerLoad::default());
+                scheduled.followers = acting
+                    .map(|((rod, node), load)| ScheduledFollower {
+                        factor: 0,
+                        rod,
+                        node,
+                        load,
+                    })
+                    .collect();
+            }
         }
         let points = scenario.points.iter();
         let varying = points.filter_map(|it| Some((it, it.in_time.as_ref()?)));
         for (factor, (point, load)) in (usize::from(is_factored)..).zip(varying) {
+            if point.follows {
+                scheduled.followers.push(ScheduledFollower {
+                    factor,
+                    rod: point.vein,
+                    node: self.grid.nearest_node(point.at),
+                    load: (self.leaf).load_on_turning_point(point, load.force, load.moment),
+                });
+                continue;
+            }
             let force = DVec3::from_array(load.force) / scale.force();
             scheduled.push_force(factor, self.node_lever(point, force));
             let moment = PointMoment {
@@ -207,6 +239,13 @@ impl DiscreteLeaf {
                 moment: scheduled.factors[*number] * it.moment,
                 ..*it
             }));
+        if !scheduled.followers.is_empty() {
+            self.followers.clone_from(&scheduled.constant_followers);
+            for it in scheduled.present_followers() {
+                let on_node = &mut self.followers[it.rod * count + it.node];
+                *on_node = *on_node + it.load;
+            }
+        }
     }
 
     /// The sum of the dead moments on points that are left to the clamp of the base.

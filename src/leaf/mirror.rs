@@ -9,7 +9,7 @@
 use crate::leaf::Leaf;
 use crate::leaf::rod_ode::{FieldChange, RodFields};
 use crate::leaf::state::State;
-use crate::scenario::{BaseSupport, Profile, Rod, Scenario};
+use crate::scenario::{Profile, Rod, Scenario};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
@@ -27,7 +27,6 @@ impl Leaf {
 pub fn is_mirrored(scenario: &Scenario) -> bool {
     let Scenario {
         rods,
-        base_held,
         coupling,
         tissue,
         tip_force,
@@ -48,7 +47,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         .any(Option::is_some)
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
-        || *base_held != BaseSupport::Clamped;
+        || !scenario.all_bases_clamped();
     let weights = |(a, b): (usize, usize)| {
         let [own, image] = [a, b].map(|vein| scenario.weight(vein).even);
         own == [image[0], -image[1], image[2]]

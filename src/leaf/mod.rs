@@ -96,10 +96,8 @@ pub struct Leaf {
     pub loads: Loads,
     /// Holder of the tips, if there is one.
     pub tip_support: Option<TipSupport>,
-    /// Whether hinges hold the bases.
+    /// Whether some base is not clamped.
     hinged: bool,
-    /// Moment per radian of the springs at the bases; empty without any.
-    base_turn_stiffness: Vec<f64>,
     /// Turns of veins without resistance.
     zero_energy_rotations: Vec<ZeroEnergyRotation>,
     /// Fractions of the length where some profile has a kink, ascending.
@@ -235,7 +233,8 @@ fn clamp_layer_edges(scenario: &Scenario) -> Vec<f64> {
         .map(|pair| pair[0].base_position().distance(pair[1].base_position()));
     let width = apart.sum::<f64>() / length;
     let mut edges = Vec::new();
-    if has_layer && scenario.base_held == BaseSupport::Clamped && width > CLAMP_LAYER.least_width {
+    let clamped = scenario.base_held.contains(&BaseSupport::Clamped);
+    if has_layer && clamped && width > CLAMP_LAYER.least_width {
         let mut part = CLAMP_LAYER.first_part * width;
         let mut edge = 0.0;
         while part < CLAMP_LAYER.largest_part {
@@ -284,8 +283,7 @@ impl Leaf {
                 position: vector(held.position, scale.length),
                 clamps: held.clamps.clone(),
             }),
-            hinged: scenario.base_held != BaseSupport::Clamped,
-            base_turn_stiffness: scenario.base_turn_stiffness.clone(),
+            hinged: !scenario.all_bases_clamped(),
             zero_energy_rotations: scenario.zero_energy_rotations(),
             kinks,
             softest_couple_stiffness: softest / scale.stiffness,
@@ -475,21 +473,32 @@ impl Leaf {
 
     /// The moment per radian of the spring at the base of rod `j`; zero without one.
     pub fn base_turn_stiffness(&self, j: usize) -> f64 {
-        let own = self.base_turn_stiffness.get(j);
-        own.map_or(0.0, |own| own / self.scale.moment())
+        self.scenario.base_spring_stiffness(j) / self.scale.moment()
     }
 
-    /// Whether springs hold the directions of the bases.
+    /// Whether springs hold the directions of some bases.
     pub fn has_base_springs(&self) -> bool {
-        !self.base_turn_stiffness.is_empty()
+        self.scenario.base_held.contains(&BaseSupport::Elastic)
     }
 
-    /// Whether the bases turn freely on their hinges.
+    /// Whether some base turns freely on a hinge.
     pub fn turns_freely(&self) -> bool {
-        self.hinged && !self.has_base_springs()
+        (0..self.rods()).any(|j| self.base_turns_freely(j))
     }
 
-    /// Whether hinges hold the bases: they stay in their places, and turn freely or against springs.
+    /// Whether the base of rod `j` turns freely on a hinge.
+    pub fn base_turns_freely(&self, j: usize) -> bool {
+        self.scenario.base_held[j] == BaseSupport::Pinned
+    }
+
+    /// Whether the base of rod `j` stays in its place and turns, freely or against a spring.
+    #[inline]
+    pub fn base_turns(&self, j: usize) -> bool {
+        self.hinged && self.scenario.base_held[j] != BaseSupport::Clamped
+    }
+
+    /// Whether some base turns. The bases of all rods then have equations, and what clamps hold of theirs
+    /// is zero.
     #[inline]
     pub fn hinged(&self) -> bool {
         self.hinged

@@ -25,6 +25,17 @@ pub struct ScheduledForce {
     pub force: DVec3,
 }
 
+/// A load without a potential on a node of a rod whose factor varies in time.
+#[derive(Clone, Copy, Debug)]
+pub struct ScheduledFollower {
+    /// Number of the factor, as of [`ScheduledForce`].
+    pub factor: usize,
+    pub rod: usize,
+    pub node: usize,
+    /// The load at a factor of one.
+    pub load: FollowerLoad,
+}
+
 /// A dead force off the axis, on the section of a node. The force on the node itself is among the loads of
 /// single veins.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -68,11 +79,15 @@ pub struct ScheduledLoads {
     pub moments: Vec<(usize, NodalMoment)>,
     /// The forces that act off the axis, also in `forces`, at factors of one, each with the number of its factor.
     pub levers: Vec<(usize, Lever)>,
+    /// Loads that turn with the sections, and moments along veins, at factors of one.
+    pub followers: Vec<ScheduledFollower>,
     /// Forces on all nodes, and dead moments on points, whose factors do not vary.
     pub constant_forces: Vec<DVec3>,
     pub constant_moments: Vec<NodalMoment>,
     /// The constant forces that act off the axis, also in `constant_forces`.
     pub constant_levers: Vec<Lever>,
+    /// The loads without a potential on all nodes whose factors do not vary; empty unless some vary.
+    pub constant_followers: Vec<FollowerLoad>,
 }
 
 impl ScheduledLoads {
@@ -87,6 +102,14 @@ impl ScheduledLoads {
         if lever.offset != DVec3::ZERO {
             self.levers.push((factor, lever));
         }
+    }
+
+    /// The loads without a potential with their present factors.
+    pub fn present_followers(&self) -> impl Iterator<Item = ScheduledFollower> {
+        self.followers.iter().map(|it| ScheduledFollower {
+            load: it.load * self.factors[it.factor],
+            ..*it
+        })
     }
 
     /// The forces with their present factors.

@@ -104,6 +104,14 @@ impl NodeSprings {
         self.springs.iter()
     }
 
+    /// The springs of node `k`, rod after rod, to change them.
+    pub fn on_node_mut(&mut self, k: usize) -> &mut [NodeSpring] {
+        match self.before.get(k..k + 2) {
+            Some(range) => &mut self.springs[range[0]..range[1]],
+            None => &mut [],
+        }
+    }
+
     pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut NodeSpring> {
         self.springs.iter_mut()
     }

@@ -124,16 +124,15 @@ impl DiscreteLeaf {
         self.grips.iter().filter(move |held| held.rod == j)
     }
 
-    /// What hinges and grips hold of the nodes of rod `j` with equations.
+    /// What bases and grips hold of the nodes of rod `j` with equations.
     pub(super) fn held_inner_components(&self, j: usize) -> impl Iterator<Item = HeldComponents> {
         let held = move |node: usize| HeldComponents {
             rod: j,
             node,
             components: self.freedom_without_tip_support(j, node).held_components(),
         };
-        let hinge = (0..1).filter(|_| self.leaf.hinged());
-        hinge
-            .chain(self.rod_grips(j).map(|grip| grip.node))
+        let base = (0..1).filter(|_| self.leaf.hinged());
+        base.chain(self.rod_grips(j).map(|grip| grip.node))
             .map(held)
     }
 
@@ -141,7 +140,7 @@ impl DiscreteLeaf {
     pub(super) fn freedom_without_tip_support(&self, j: usize, i: usize) -> NodeFreedom {
         if i == 0 {
             return NodeFreedom {
-                rotation: self.leaf.hinged(),
+                rotation: self.leaf.base_turns(j),
                 displacement: BVec3::FALSE,
             };
         }
@@ -244,7 +243,7 @@ impl DiscreteLeaf {
         let tissue = self.rigid_end_load(state, j, 0);
         Wrench {
             force: own.force + tissue.force,
-            moment: match self.leaf.hinged() {
+            moment: match self.leaf.base_turns(j) {
                 true => -self.spring_load(state, j, 0).moment,
                 false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
             },
@@ -435,6 +434,17 @@ impl Leaf {
         }
     }
 
+    /// Puts the bases where they are held: clamped ones in their directions, too.
+    pub fn place_held_bases(&self, state: &mut State) {
+        for j in 0..self.rods() {
+            let (base, pose) = (state.base(j), self.base_pose(j));
+            state.x[base] = pose.position;
+            if !self.base_turns(j) {
+                state.q[base] = pose.rotation;
+            }
+        }
+    }
+
     /// Puts the tips where they are held, if they are.
     pub fn place_held_tips(&self, state: &mut State) {
         let Some(held) = &self.tip_support else {
@@ -569,7 +579,8 @@ impl DiscreteLeaf {
                 now: state.q[state.base(j)],
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
-            let moments = (!self.leaf.turns_freely()).then(|| rods.clone().map(moment).sum());
+            let directed = (rods.clone()).filter(|j| !self.leaf.base_turns_freely(*j));
+            let moments = directed.map(moment).reduce(|sum, own| sum + own);
             let angle = turning.angle_to_representative(&begins, moments);
             let [turn, back] = turning.rotations(angle);
             let point = turning.point / self.leaf.scale.length;
@@ -578,6 +589,9 @@ impl DiscreteLeaf {
                 for node in self.moving_nodes() {
                     let k = state.base(j) + node;
                     let freedom = self.node_freedom(j, node);
+                    if node == 0 && freedom.is_fixed() {
+                        continue;
+                    }
                     if freedom.displacement.any() || node < n {
                         state.x[k] = point + turn * (state.x[k] - point);
                     }

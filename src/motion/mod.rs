@@ -330,6 +330,16 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
     {
         energy += it.force.length_squared() / physics.inertia(leaf, it.rod, it.node).mass;
     }
+    for it in leaf
+        .scheduled_loads
+        .iter()
+        .flat_map(|it| it.present_followers())
+    {
+        let inertia = physics.inertia(leaf, it.rod, it.node);
+        let moment = it.load.moment + it.load.dead_moment;
+        energy += it.load.force.length_squared() / inertia.mass;
+        energy += moment.length_squared() / inertia.transverse;
+    }
     for it in leaf.dead_moments_under(loads) {
         energy += it.moment.length_squared() / physics.inertia(leaf, 0, it.node).transverse;
     }

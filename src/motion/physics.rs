@@ -383,7 +383,7 @@ impl Physics {
             .iter()
             .all(|load| load.is_constant());
         let still = still && factors.is_empty();
-        let points = leaf.scenario().points.iter();
+        let points = leaf.scenario().points.iter().filter(|it| !it.follows);
         let mut turned = points.filter_map(|it| it.in_time.as_ref());
         let turned = !factors.is_empty() && turned.any(|it| it.moment != [0.0; 3]);
         let air = leaf
@@ -398,7 +398,10 @@ impl Physics {
             } else {
                 leaf.loads.dead_moment_factor
             },
-            follower_factor: leaf.loads.follower_factor,
+            follower_factor: match !factors.is_empty() && leaf.scenario().has_followers_in_time() {
+                true => 1.0,
+                false => leaf.loads.follower_factor,
+            },
             constant_loads: None,
             point_masses: Vec::new(),
             knots: {

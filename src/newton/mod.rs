@@ -552,7 +552,7 @@ pub trait FollowerForces {
 
 /// Solves for the increments under `forces`, with the derivative of the `following` ones, from the factors
 /// of K; `None` if too many directions would be needed.
-fn solve_with_follower_forces(
+pub fn solve_with_follower_forces(
     factors: &mut MatrixFactors,
     forces: &NodalField,
     following: &dyn FollowerForces,

@@ -4,7 +4,7 @@ use crate::posture::Posture;
 use crate::posture::points::PostureError;
 use crate::posture::rest::Stations;
 use crate::posture::rod::{HangingRod, PointForce};
-use crate::scenario::{BaseSupport, PointLoad, Profile, Radii, RodPlace, Scenario};
+use crate::scenario::{PointLoad, Profile, Radii, RodPlace, Scenario};
 use crate::words;
 use glam::{DQuat, DVec3};
 
@@ -130,7 +130,7 @@ fn check(scenario: &Scenario) -> Result<(), PostureError> {
              acts on the axis",
         ),
         (
-            scenario.base_held != BaseSupport::Clamped,
+            !scenario.all_bases_clamped(),
             "leaf.base_held",
             "a base that turns adds a stiffness of its own: clamp it (leave this out), and begin the points above it",
         ),

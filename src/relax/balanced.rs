@@ -180,15 +180,7 @@ pub(crate) fn growing_motions(
 
 /// Puts bases and tips where the leaf holds them.
 fn place_supports(leaf: &Leaf, state: &mut State) {
-    match leaf.hinged() {
-        true => {
-            for j in 0..leaf.rods() {
-                let base = state.base(j);
-                state.x[base] = leaf.base_pose(j).position;
-            }
-        }
-        false => leaf.place_bases(state),
-    }
+    leaf.place_held_bases(state);
     leaf.place_held_tips(state);
 }
 

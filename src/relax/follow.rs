@@ -136,6 +136,11 @@ fn relax_with_progress(
         let why = remark.map_or_else(|| leaf.outcome.word().into(), ToString::to_string);
         return Ok(Err(ContinuationFailure::NotAtRest(why)));
     }
+    let follows = found.levels.iter().any(|level| level.leaf.has_followers());
+    if follows && leaf.stable() == Some(false) {
+        let why = "small motions about it grow under loads that turn with the section";
+        return Ok(Err(ContinuationFailure::NotAtRest(why.into())));
+    }
     Ok(Ok(found))
 }
 

@@ -2,10 +2,13 @@
 //! held.
 
 use crate::leaf::{
-    DenseParameterForces, DirectSolver, DiscreteLeaf, ForceCarriers, LeafParameterDerivative,
-    LinearResponse, LinearSolveOutcome, MatrixFactors, NodalField, ParameterForces, System,
+    DenseParameterForces, DirectSolver, DiscreteLeaf, ForceCarriers, Increment,
+    LeafParameterDerivative, LinearResponse, LinearSolveOutcome, MatrixFactors, NodalField,
+    ParameterForces, System, Weighted, add_to_increment,
 };
+use crate::newton::{FollowerForces, solve_with_follower_forces};
 use crate::relax::accuracy::transfer::GridLevel;
+use crate::relax::solve_on_grid::follower_loads::WithoutPotential;
 use glam::DVec3;
 
 /// Relative accuracy of the conjugate gradients, as a part of the tolerance, and its lower
@@ -38,6 +41,8 @@ impl Linearized {
         leaf.assemble(state, &mut system);
         leaf.add_phase_conditions(state, &mut system);
         let factorized = match leaf.has_moments() {
+            // Where K is unsymmetric by these loads it is factorized as a whole.
+            _ if has_unsymmetric_matrix(leaf) => false,
             false => system.factorize(0.0),
             true => system.factorize_indefinite(),
         };
@@ -58,10 +63,14 @@ impl Linearized {
         level: &GridLevel,
         rates: &[LeafParameterDerivative],
     ) -> Vec<ParameterForces> {
-        let force = |rate| {
-            level
-                .leaf
-                .parameter_forces(&level.state, &self.carriers, rate)
+        let GridLevel { leaf, state } = level;
+        let force = |rate: &LeafParameterDerivative| {
+            let mut forces = leaf.parameter_forces(state, &self.carriers, rate);
+            if has_unsymmetric_matrix(leaf) {
+                add_wind_changes(level, rate, &mut forces);
+                add_changes_by_supports(level, rate, &mut forces);
+            }
+            forces
         };
         rates.iter().map(force).collect()
     }
@@ -106,9 +115,13 @@ impl Linearized {
         self.factorizations += 1;
         let pattern = DirectSolver::new(&self.system).ok()?;
         let mut factor: MatrixFactors = pattern.factorize(&self.system, 0.0).ok()?;
+        let following = has_unsymmetric_matrix(leaf).then(|| WithoutPotential::new(leaf));
         let mut direct = |rhs: &NodalField| {
             *solves += 1;
-            Some(factor.solve_bordered(rhs, &[]).increments)
+            match &following {
+                Some(forces) => solve_with_follower_forces(&mut factor, rhs, forces, &level.state),
+                None => Some(factor.solve_bordered(rhs, &[]).increments),
+            }
         };
         (loads.iter())
             .map(|load| response(leaf, carriers, load, &mut direct))
@@ -124,6 +137,62 @@ impl Linearized {
         response: &LinearResponse,
     ) -> f64 {
         level.leaf.mutual_work(&self.carriers, forces, response)
+    }
+}
+
+/// Whether the derivative of the forces on a leaf has no symmetry: of wind, and of loads that turn with the sections. A
+/// system of equations takes account of dead moments on a single rod itself.
+fn has_unsymmetric_matrix(leaf: &DiscreteLeaf) -> bool {
+    leaf.leaf.in_wind() || leaf.has_followers()
+}
+
+/// Adds the changes of the drag on the nodes of a leaf in wind.
+fn add_wind_changes(
+    level: &GridLevel,
+    rate: &LeafParameterDerivative,
+    forces: &mut ParameterForces,
+) {
+    let GridLevel { leaf, state } = level;
+    let nodes = leaf.moving_nodes();
+    for Weighted { weight, term } in rate.weighted_leaves().iter().filter(|it| it.term.in_wind()) {
+        let there = DiscreteLeaf::new(term, leaf.grid.clone());
+        let drag = WithoutPotential::new(&there).wind_forces(state);
+        for (j, i) in leaf.rod_index_pairs(nodes.clone()) {
+            let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
+            add_to_increment(on, DVec3::ZERO, *weight * drag[state.base(j) + i]);
+        }
+    }
+}
+
+/// Adds the changes of the forces without a potential as supports and clamped bases move.
+fn add_changes_by_supports(
+    level: &GridLevel,
+    rate: &LeafParameterDerivative,
+    forces: &mut ParameterForces,
+) {
+    let GridLevel { leaf, state } = level;
+    let following = WithoutPotential::new(leaf);
+    let nodes = leaf.moving_nodes().len();
+    let rod = |moved: &Vec<Increment>| {
+        let mut all = moved.clone();
+        all.resize(nodes, [0.0; 6]);
+        all
+    };
+    let moved: NodalField = forces.support_increments.iter().map(rod).collect();
+    let mut change: NodalField = vec![vec![[0.0; 6]; nodes]; leaf.rods()];
+    following.add_derivative(state, &moved, &mut change);
+    following.add_base_motion(
+        state,
+        |j| rate.base_motion_rate(j).displacement,
+        &mut change,
+    );
+    for (j, change) in change.iter().enumerate() {
+        let on_rod = forces.rod_forces_mut(j, nodes).iter_mut().zip(change);
+        for (on, change) in on_rod {
+            on.iter_mut()
+                .zip(change)
+                .for_each(|(sum, more)| *sum += more);
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Sensitivities of a leaf at rest: derivatives of its results with respect to numbers of its
 //! scenario, from the linearized equations on each grid, extrapolated like the results
-//! themselves. Derivatives of eigenvalues, and of the moments on clamps, are finite differences between
-//! neighbouring equilibria, which are known to first order from the response.
+//! themselves. Derivatives of eigenvalues, of the moments on clamps, and in wind of the forces on supports, are finite
+//! differences between neighbouring equilibria, which are known to first order from the response.
 
 use crate::leaf::{
     DiscreteLeaf, Leaf, LeafParameterDerivative, LinearResponse, ParameterForces, State, Weighted,
@@ -15,6 +15,7 @@ use crate::relax::linear_response::Linearized;
 use crate::relax::plan::UNKNOWNS;
 use crate::relax::result::Sensitivity;
 use crate::relax::result::forces::{GripReaction, Reaction};
+use crate::relax::solve_on_grid::follower_loads::WithoutPotential;
 use crate::scenario::{Grip, Scenario, SupportKind};
 use crate::{modes, rotation};
 use glam::DVec3;
@@ -93,7 +94,8 @@ pub(crate) fn sensitivities(
         return Vec::new();
     };
     let leaf = &finest.leaf.leaf;
-    let differences = modes > 0 || has_clamped_tip(leaf) || has_clamped_grips(leaf);
+    let held_in_wind = leaf.in_wind() && leaf.has_placed_supports();
+    let differences = modes > 0 || has_clamped_tip(leaf) || has_clamped_grips(leaf) || held_in_wind;
     let known: Vec<DifferentiatedParameter> = (numbers.iter())
         .filter_map(|(key, parameter)| {
             let neighbours = if differences {
@@ -243,9 +245,10 @@ impl SensitivityGrid<'_> {
         let (leaf, state) = (&self.level.leaf, &self.level.state);
         let mut linear = Linearized::new(self.level, self.tolerance);
         let forces = linear.forces(self.level, rates);
-        // A dead moment has no potential, and the unsymmetric matrix need not have real modes.
+        // Where loads have no potential the matrix is unsymmetric, and need not have real modes.
         let physics = Physics::new(&leaf.leaf);
-        let modes = match self.modes > 0 && !leaf.has_moments() {
+        let symmetric = !leaf.has_moments() && !leaf.has_followers() && !leaf.leaf.in_wind();
+        let modes = match self.modes > 0 && symmetric {
             true => modes::unsoftened_modes(leaf, state, self.modes),
             false => None,
         };
@@ -257,8 +260,7 @@ impl SensitivityGrid<'_> {
             leaf.leaf.tip_support.is_some(),
             leaf.leaf.has_placed_supports(),
         );
-        if forces.len() > MAX_DIRECT_PARAMETERS && modes.is_empty() && !leaf.has_moments() && !held
-        {
+        if forces.len() > MAX_DIRECT_PARAMETERS && modes.is_empty() && symmetric && !held {
             return Some(DerivativesOnGrid {
                 eigenvalues,
                 derivatives: self.tips_by_adjoint(&mut linear, &forces)?,
@@ -284,7 +286,10 @@ impl SensitivityGrid<'_> {
             let work: f64 = works.sum();
             ResultDerivatives {
                 tips: self.tips().map(tip).collect(),
-                energy: vec![DVec3::X * (forces.energy + work)],
+                energy: match leaf.has_followers() || leaf.leaf.in_wind() {
+                    true => Vec::new(),
+                    false => vec![DVec3::X * (forces.energy + work)],
+                },
                 eigenvalues: of_modes.map(|value| DVec3::X * value).collect(),
                 reaction: match tip_held {
                     true => self.reaction(near.as_ref(), rate, response),
@@ -312,7 +317,12 @@ impl SensitivityGrid<'_> {
         response: &LinearResponse,
     ) -> Vec<DVec3> {
         let GridLevel { leaf, state } = self.level;
-        let mut all = vec![leaf.reaction_rate(state, rate, response)];
+        let mut all = match near.filter(|_| leaf.leaf.in_wind()) {
+            Some(near) => {
+                near.vector_derivatives(self.level, |leaf, state| vec![leaf.reaction(state).force])
+            }
+            None => vec![leaf.reaction_rate(state, rate, response)],
+        };
         if has_clamped_tip(&leaf.leaf) {
             all.extend(
                 near.iter()
@@ -333,7 +343,13 @@ impl SensitivityGrid<'_> {
         if !leaf.has_grips() {
             return Vec::new();
         }
-        let forces = leaf.grip_force_rates(state, rate, response);
+        let forces = match near.filter(|_| leaf.leaf.in_wind()) {
+            Some(near) => near.vector_derivatives(self.level, |leaf, state| {
+                let reactions = leaf.grip_reactions(state).into_iter();
+                reactions.map(|on_grip| on_grip.force).collect()
+            }),
+            None => leaf.grip_force_rates(state, rate, response),
+        };
         let clamped = near.filter(|_| has_clamped_grips(&leaf.leaf));
         let moments = clamped.map_or(vec![DVec3::ZERO; forces.len()], |near| {
             near.grip_moment_rates(self.level)
@@ -437,11 +453,17 @@ impl NeighbouringEquilibria {
         let leaf = &level.leaf;
         let near = |near: &NeighbouringScenario| {
             let own = Leaf::with_scale(Arc::clone(&near.scenario), leaf.leaf.scale);
+            let state = displace_along_response(level, rate, response, near.offset);
+            let mut there = DiscreteLeaf::new(&own, leaf.grid.clone());
+            if own.in_wind() {
+                let drag = WithoutPotential::new(&there).wind_forces(&state);
+                there.add_nodal_loads(&drag);
+            }
             NeighbouringEquilibrium {
                 offset: near.offset,
                 weight: near.weight,
-                leaf: DiscreteLeaf::new(&own, leaf.grid.clone()),
-                state: displace_along_response(level, rate, response, near.offset),
+                leaf: there,
+                state,
             }
         };
         NeighbouringEquilibria(scenarios.iter().map(near).collect())

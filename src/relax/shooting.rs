@@ -225,16 +225,16 @@ fn shoot(
     let on_bases = errors.map(|errors| {
         let bases = || rods.iter().map(|rod| &rod.nodes[0]);
         let places: Vec<DVec3> = bases().map(|base| base.position).collect();
-        let hinged = scenario.base_held == BaseSupport::Pinned;
-        let wrench = |base: &NodeState| Wrench {
+        let wrench = |(base, held): (&NodeState, &BaseSupport)| Wrench {
             force: base.rotation * base.n,
-            moment: match hinged {
-                true => DVec3::ZERO,
-                false => base.rotation * base.m,
+            moment: match held {
+                BaseSupport::Pinned => DVec3::ZERO,
+                BaseSupport::Clamped | BaseSupport::Elastic => base.rotation * base.m,
             },
         };
-        let wrenches: Vec<Wrench> = bases().map(wrench).collect();
-        BaseReactions::from_each(&places, &wrenches, hinged, [errors.force, errors.moment])
+        let held = &scenario.base_held;
+        let wrenches: Vec<Wrench> = bases().zip(held).map(wrench).collect();
+        BaseReactions::from_each(&places, &wrenches, held, [errors.force, errors.moment])
     });
     let (base_reactions, base_reaction) = on_bases.map_or((Vec::new(), None), |on_bases| {
         (on_bases.each, Some(on_bases.all))

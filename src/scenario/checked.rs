@@ -32,10 +32,10 @@ pub struct Scenario {
     pub radii: Radii,
     /// The blade that the veins and the tissue follow from, if a blade is given in place of them.
     pub blade: Option<Arc<Blade>>,
-    /// What is held of the bases, unless [`Dynamics::clamped`] says that they are free.
-    pub base_held: BaseSupport,
-    /// The moment per radian by which the base of each rod is held in its natural direction; empty unless bases
-    /// are elastic.
+    /// What is held of the base of each rod, unless [`Dynamics::clamped`] says that they are free.
+    pub base_held: Vec<BaseSupport>,
+    /// The moment per radian by which the base of each rod is held in its natural direction if it is elastic;
+    /// empty unless some base is.
     pub base_turn_stiffness: Vec<f64>,
     /// Whether all tips share one point.
     pub joined: bool,
@@ -97,6 +97,20 @@ pub struct Scenario {
 }
 
 impl Scenario {
+    /// Whether every base is held in its direction, rigidly, if it is held at all.
+    pub fn all_bases_clamped(&self) -> bool {
+        let clamped = |held: &BaseSupport| *held == BaseSupport::Clamped;
+        self.base_held.iter().all(clamped)
+    }
+
+    /// The stiffness of the spring at the base of rod `j`, moment per radian; zero without one.
+    pub fn base_spring_stiffness(&self, j: usize) -> f64 {
+        match self.base_held[j] {
+            BaseSupport::Elastic => self.base_turn_stiffness[j],
+            BaseSupport::Clamped | BaseSupport::Pinned => 0.0,
+        }
+    }
+
     /// The units that make the leaf dimensionless.
     pub fn scale(&self) -> Scale {
         Scale::of(&self.rods)
@@ -148,6 +162,10 @@ impl Scenario {
     /// read as one, the grid has one node.
     pub fn kinks(&self) -> Vec<f64> {
         let masses = (0..self.rods.len()).filter_map(|vein| self.weight(vein).of_mass);
+        let factored = self.factored.iter().flat_map(|loads| {
+            let all = [&loads.distributed, &loads.follower, &loads.couple];
+            all.into_iter().flatten().flatten().flatten()
+        });
         let profiles = self.rods.iter().flat_map(Rod::constitutive_profiles);
         let profiles = profiles
             .chain(masses.map(|(_, mass)| mass))
@@ -156,6 +174,7 @@ impl Scenario {
             .chain(self.foundation.iter().flatten().flatten())
             .chain(self.follower.iter().flatten().flatten())
             .chain(self.couple.iter().flatten().flatten())
+            .chain(factored)
             .chain(self.wind.iter().flat_map(|wind| &wind.width));
         let points = self.points.iter().map(|point| point.at);
         let ends = self.grips.iter().flat_map(|grip| grip.at);
@@ -260,6 +279,8 @@ impl Scenario {
         self.own_gravity = loads.own_gravity;
         self.g = loads.g;
         self.distributed = loads.distributed;
+        self.follower = loads.follower;
+        self.couple = loads.couple;
     }
 
     /// The key, or the table, of something that acts on single veins or on each of them, so that the
@@ -288,7 +309,15 @@ impl Scenario {
         keys.into_iter().find_map(|(acts, key)| acts.then_some(key))
     }
 
-    /// Whether loads act that turn with the sections, or moments along veins: they have no potential, and
+    /// Whether loads that turn with the sections, or moments along veins, vary in time: at rest they may be zero.
+    pub fn has_followers_in_time(&self) -> bool {
+        let turns = |point: &PointLoad| point.follows && point.in_time.is_some();
+        let factored = self.factored.as_ref();
+        factored.is_some_and(|loads| loads.follower.is_some() || loads.couple.is_some())
+            || self.points.iter().any(turns)
+    }
+
+    /// Whether loads act at rest that turn with the sections, or moments along veins: they have no potential, and
     /// act on any vein.
     pub fn has_followers(&self) -> bool {
         let acts = |point: &PointLoad| {

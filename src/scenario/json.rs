@@ -190,7 +190,10 @@ impl Scenario {
             Key::Length => number_or_list(self.rods.iter().map(|rod| rod.length)),
             Key::Base => vector_or_list(self.rods.iter().map(|rod| rod.base)),
             Key::Elevation => number_or_list(self.rods.iter().map(|rod| rod.elevation)),
-            Key::BaseHeld => json!(self.base_held),
+            Key::BaseHeld => match self.base_held.split_first() {
+                Some((first, others)) if others.iter().all(|other| other == first) => json!(first),
+                _ => json!(self.base_held),
+            },
             Key::BaseTurnStiffness if self.base_turn_stiffness.is_empty() => return None,
             Key::BaseTurnStiffness => number_or_list(self.base_turn_stiffness.iter().copied()),
             Key::Fan => list_value(self.rods.iter().map(|rod| rod.angle)),
@@ -201,14 +204,14 @@ impl Scenario {
                 let axis = Key::COUPLING.iter().position(|axis| *axis == key)?;
                 number_or_list(self.coupling.iter().map(|gap| gap[axis]))
             }
-            Key::Gravity | Key::G | Key::Distributed | Key::LoadFactor => {
-                return self.load_value(key);
-            }
+            Key::Gravity
+            | Key::G
+            | Key::Distributed
+            | Key::Follower
+            | Key::Couple
+            | Key::CoupleFollows
+            | Key::LoadFactor => return self.load_value(key),
             Key::FoundationStiffness => vector_quantity(self.foundation.as_deref()?),
-            Key::Follower => vector_quantity(self.follower.as_deref()?),
-            Key::Couple => vector_quantity(self.couple.as_deref()?),
-            Key::CoupleFollows if self.couple.is_none() => return None,
-            Key::CoupleFollows => json!(self.couple_follows),
             Key::TipForce => list_value(self.tip_force),
             Key::TipMoment => list_value(self.tip_moment),
             Key::Tolerance => number_value(self.tolerance),
@@ -228,6 +231,8 @@ impl Scenario {
             whole.own_gravity.clone_from(&loads.own_gravity);
             whole.g = loads.g;
             whole.distributed.clone_from(&loads.distributed);
+            whole.follower.clone_from(&loads.follower);
+            whole.couple.clone_from(&loads.couple);
         }
         Some(match key {
             Key::Gravity => {
@@ -236,6 +241,9 @@ impl Scenario {
             }
             Key::G => list_value(whole.g),
             Key::Distributed => vector_quantity(whole.distributed.as_deref()?),
+            Key::Follower => vector_quantity(whole.follower.as_deref()?),
+            Key::Couple => vector_quantity(whole.couple.as_deref()?),
+            Key::CoupleFollows => json!(whole.couple.as_ref().map(|_| self.couple_follows)?),
             _ => return None,
         })
     }

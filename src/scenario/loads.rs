@@ -49,7 +49,7 @@ pub struct Landing {
     pub velocity: [f64; 3],
 }
 
-/// A dead load on a point whose force and moment vary in time.
+/// A load on a point, dead or turning with the section, whose force and moment vary in time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VaryingPointLoad {
     /// The factor of both.
@@ -104,13 +104,20 @@ pub struct FactoredLoads {
     pub g: [f64; 3],
     /// As [`Scenario::distributed`](crate::scenario::Scenario::distributed).
     pub distributed: Option<Vec<[Profile; 3]>>,
+    /// As [`Scenario::follower`](crate::scenario::Scenario::follower).
+    pub follower: Option<Vec<[Profile; 3]>>,
+    /// As [`Scenario::couple`](crate::scenario::Scenario::couple).
+    pub couple: Option<Vec<[Profile; 3]>>,
 }
 
 impl FactoredLoads {
     /// These loads times a factor.
     fn times(&self, factor: f64) -> FactoredLoads {
         let along = |load: &[Profile; 3]| load.each_ref().map(|of| of.scaled(factor));
-        let distributed = self.distributed.as_ref().filter(|_| factor != 0.0);
+        let along_veins = |loads: &Option<Vec<[Profile; 3]>>| {
+            let some = loads.as_ref().filter(|_| factor != 0.0);
+            some.map(|all| all.iter().map(along).collect())
+        };
         FactoredLoads {
             factor: self.factor.clone(),
             gravity: scaled(factor, self.gravity),
@@ -118,7 +125,9 @@ impl FactoredLoads {
                 .map(|own| scaled(factor, *own))
                 .collect(),
             g: scaled(factor, self.g),
-            distributed: distributed.map(|all| all.iter().map(along).collect()),
+            distributed: along_veins(&self.distributed),
+            follower: along_veins(&self.follower),
+            couple: along_veins(&self.couple),
         }
     }
 
@@ -128,12 +137,19 @@ impl FactoredLoads {
     }
 }
 
+/// Loads per length of each vein, as they are read.
+pub(super) struct LoadsAlongVeins<'l> {
+    pub distributed: &'l Option<Vec<[Profile; 3]>>,
+    pub follower: &'l Option<Vec<[Profile; 3]>>,
+    pub couple: &'l Option<Vec<[Profile; 3]>>,
+}
+
 /// Reads `load.factor`, if it is given, of loads as they are read.
 pub(super) fn read_load_factor(
     entries: &Entries,
     weights: &RodWeights,
     g: [f64; 3],
-    distributed: &Option<Vec<[Profile; 3]>>,
+    along: LoadsAlongVeins,
 ) -> ScenarioResult<Option<Box<FactoredLoads>>> {
     let Some(item) = entries.given_value(Key::LoadFactor) else {
         return Ok(None);
@@ -142,16 +158,14 @@ pub(super) fn read_load_factor(
         !entries.is_given(Key::GravityInTime),
         "dynamics.gravity is gravity in time, too: leave one of them out",
     )?;
-    item.refuse_unless(
-        !entries.is_given(Key::Follower) && !entries.is_given(Key::Couple),
-        "changes dead loads alone: leave it out, or load.follower and load.couple",
-    )?;
     Ok(Some(Box::new(FactoredLoads {
         factor: item.factors_in_time()?,
         gravity: weights.shared,
         own_gravity: weights.own.clone(),
         g,
-        distributed: distributed.clone(),
+        distributed: along.distributed.clone(),
+        follower: along.follower.clone(),
+        couple: along.couple.clone(),
     })))
 }
 
@@ -257,12 +271,6 @@ fn read_point_load(entries: &Entries, row: usize, rods: usize) -> ScenarioResult
         })),
         false => None,
     };
-    if varying.is_some() {
-        item(Key::PointFollows)?.refuse_unless(
-            !follows,
-            "turns the load with the section, and a factor in time changes dead loads only: leave one of them out",
-        )?;
-    }
     let given = PointLoad {
         vein: item(Key::PointVein)?.whole_number(rods)? - 1,
         at: item(Key::PointAt)?.fraction()?,

@@ -15,7 +15,7 @@ use crate::scenario::loads::{PointLoad, check_single_rod_moments, read_dynamics,
 use crate::scenario::photo::read_photo;
 use crate::scenario::schedule::Schedule;
 use crate::scenario::support_motion::read_support_motion;
-use crate::scenario::supports::{Grip, SupportKind};
+use crate::scenario::supports::Grip;
 use crate::scenario::veins::{StiffnessSource, read_joined, read_tissue, read_veins};
 use crate::scenario::{limits, loads, supports};
 use std::fs::File;
@@ -205,7 +205,12 @@ impl Entries {
         let distributed = along(Key::Distributed)?;
         let foundation = along(Key::FoundationStiffness)?;
         let (follower, couple) = (along(Key::Follower)?, along(Key::Couple)?);
-        let factored = loads::read_load_factor(self, &weights, g, &distributed)?;
+        let along = loads::LoadsAlongVeins {
+            distributed: &distributed,
+            follower: &follower,
+            couple: &couple,
+        };
+        let factored = loads::read_load_factor(self, &weights, g, along)?;
         let points = loads::read_point_loads(self, rods.len())?;
         let tip_force = self.value_or_default(Key::TipForce)?.vector()?;
         let item = self.value_or_default(Key::TipMoment)?;
@@ -360,7 +365,7 @@ fn swings_on_moving_support(scenario: &Scenario, point: &PointLoad) -> bool {
     };
     let holds = |(grip, moves): (&Grip, &Schedule<[f64; 3]>)| {
         let here = grip.vein == point.vein && (grip.at[0]..=grip.at[1]).contains(&point.at);
-        here && grip.held == SupportKind::Pinned && !moves.is_constant()
+        here && !grip.holds_directions() && !moves.is_constant()
     };
     let tip = scenario.held_tip.as_ref();
     let on_tip = motion.tip.is_some() && point.at == 1.0;
@@ -453,9 +458,10 @@ impl Entries {
             ValueSchema::Whole if key == Key::Rods => {
                 Key::all().any(|key| self.is_list_of_rods(key))
             }
-            ValueSchema::Text | ValueSchema::Whole | ValueSchema::WholeOrList => {
-                key.table() != "units"
-            }
+            ValueSchema::Text
+            | ValueSchema::TextPerRod
+            | ValueSchema::Whole
+            | ValueSchema::WholeOrList => key.table() != "units",
             _ => false,
         }
     }
@@ -464,6 +470,7 @@ impl Entries {
     fn is_list_of_rods(&self, key: Key) -> bool {
         let single = match key.form() {
             ValueSchema::PerRod(_)
+            | ValueSchema::TextPerRod
             | ValueSchema::Quantity(_)
             | ValueSchema::PerGap(_)
             | ValueSchema::Fan => 0,

@@ -246,36 +246,39 @@ impl EntryValue<'_> {
 
 /// What is held of the bases.
 pub(super) struct HeldBases {
-    pub held: BaseSupport,
-    /// The stiffness of the spring of each rod; empty unless bases are elastic.
+    /// Of the base of each rod.
+    pub held: Vec<BaseSupport>,
+    /// The stiffness of the spring of each rod, if it has one; empty unless some base is elastic.
     pub turn_stiffness: Vec<f64>,
 }
 
 /// Reads `leaf.base_held` and `leaf.base_turn_stiffness` of so many rods.
 pub(super) fn read_base_support(entries: &Entries, rods: usize) -> ScenarioResult<HeldBases> {
     let item = entries.value_or_default(Key::BaseHeld)?;
-    let held = item.word(
+    let held: Vec<BaseSupport> = item.word_for_each(
+        rods,
         "must be \"clamped\" (positions and directions are held), \"pinned\" (positions alone) or \"elastic\" \
          (directions by springs)",
     )?;
+    let clamped = held.iter().all(|held| *held == BaseSupport::Clamped);
     item.refuse_unless(
-        held == BaseSupport::Clamped || entries.value_or_default(Key::Clamped)?.switch()?,
+        clamped || entries.value_or_default(Key::Clamped)?.switch()?,
         "contradicts dynamics.clamped = false, a base that is free: leave one of them out",
     )?;
     let springs = entries.given_value(Key::BaseTurnStiffness);
-    let turn_stiffness = match (held, springs) {
-        (BaseSupport::Elastic, Some(springs)) => springs.number_for_each(rods)?,
-        (BaseSupport::Elastic, None) => {
+    let turn_stiffness = match (held.contains(&BaseSupport::Elastic), springs) {
+        (true, Some(springs)) => springs.number_for_each(rods)?,
+        (true, None) => {
             return Err(item.value_error(
                 "needs leaf.base_turn_stiffness, the moment per radian of the springs at the bases",
             ));
         }
-        (_, Some(springs)) => {
+        (false, Some(springs)) => {
             return Err(
                 springs.value_error("belongs to bases that give: add leaf.base_held = \"elastic\"")
             );
         }
-        (_, None) => Vec::new(),
+        (false, None) => Vec::new(),
     };
     Ok(HeldBases {
         held,
@@ -352,10 +355,6 @@ fn read_grip(
         stiffness,
         turn_stiffness,
     };
-    way.refuse_unless(
-        moves.is_constant() || grip.is_rigid(),
-        "changes in time, as rigid grips alone do: leave out its stiffness and turn_stiffness, or give one vector",
-    )?;
     Ok(grip)
 }
 

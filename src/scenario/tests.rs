@@ -76,8 +76,8 @@ fn all_that_is_given_arrives() {
     let leaf = scenario_with_overrides("").unwrap();
     assert_eq!(leaf.rods[2].base, [0.0, 0.1, 0.0]);
     assert_eq!(
-        (leaf.rods[1].elevation, leaf.base_held),
-        (0.3, BaseSupport::Pinned)
+        (leaf.rods[1].elevation, leaf.base_held.clone()),
+        (0.3, vec![BaseSupport::Pinned; leaf.rods.len()])
     );
     let gap = |across: f64| Tissue {
         stiffness: [20.0, across, 0.0].map(Profile::Constant),

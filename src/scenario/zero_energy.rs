@@ -170,7 +170,6 @@ impl Scenario {
         if self.has_followers() {
             return rotations;
         }
-        let hinged = self.base_held == BaseSupport::Pinned;
         for rods in self.tied_groups() {
             let windy = self.wind.is_some();
             let between_clamps = self.axis_between_clamps(rods.clone()).filter(|_| !windy);
@@ -181,27 +180,31 @@ impl Scenario {
                 section_rate: -1.0,
                 includes_bent_veins: true,
             }));
-            if hinged {
-                // Rigid turns before spins: to lean, a vein spins back from where it has turned to as a whole.
-                let rigid = self.rigid_rotation(&rods).filter(|_| !windy);
-                rotations.extend(rigid);
-                rotations.extend(
-                    rods.filter(|j| self.spins(*j))
-                        .map(|j| self.spin_rotation(j)),
-                );
-            }
+            // Rigid turns before spins: to lean, a vein spins back from where it has turned to as a whole.
+            let rigid = self.rigid_rotation(&rods).filter(|_| !windy);
+            rotations.extend(rigid);
+            rotations.extend(
+                rods.filter(|j| self.spins(*j))
+                    .map(|j| self.spin_rotation(j)),
+            );
         }
         rotations
     }
 
-    /// Whether every section of a vein on a hinge can turn about its own tangent, provided that the
+    /// Whether the base of a vein turns freely.
+    fn is_pinned(&self, vein: usize) -> bool {
+        self.base_held[vein] == BaseSupport::Pinned
+    }
+
+    /// Whether every section of a vein is on a hinge and can turn about its own tangent, provided that the
     /// vein is round or straight.
     fn spins(&self, vein: usize) -> bool {
         let gaps = [vein.checked_sub(1), Some(vein)].into_iter().flatten();
         let tissue = |gap| (self.tissue.iter()).any(|all| all.get(gap).is_some_and(has_some));
         let clamps = |grip: &Grip| grip.vein == vein && grip.held == SupportKind::Clamped;
         let tip = self.held_tip.as_ref();
-        tip.is_none_or(|held| held.clamps.is_none())
+        self.is_pinned(vein)
+            && tip.is_none_or(|held| held.clamps.is_none())
             && !gaps.clone().any(tissue)
             && !self.grips.iter().any(clamps)
             && !self.has_moments_on(&(vein..vein + 1))
@@ -253,7 +256,7 @@ impl Scenario {
     /// Moments that keep a leaf from resting: on a group of veins that turns as a rigid body while no
     /// force does work, their sum about the axis is not zero.
     pub fn unbalanced_moment(&self) -> Option<UnbalancedMoment> {
-        if self.base_held != BaseSupport::Pinned || self.wind.is_some() || self.has_followers() {
+        if self.wind.is_some() || self.has_followers() {
             return None;
         }
         self.tied_groups().into_iter().find_map(|group| {
@@ -325,13 +328,13 @@ impl Scenario {
         }) && { foundation }.all(even)
     }
 
-    /// The places where a group of veins is held, from that of its first hinge; `None` if clamps hold
-    /// it, or grips, whose places depend on the shapes at rest, unless these hold along one axis only.
+    /// The places where a group of veins on hinges is held, from that of its first hinge; `None` if clamps
+    /// hold it, springs, or grips, whose places depend on the shapes at rest, unless these hold along one axis only.
     fn support_offsets(&self, group: &Range<usize>) -> Option<Vec<DVec3>> {
         let tip = self.held_tip.as_ref();
         let gripped = self.roller_axis(group).is_err();
         let clamped = tip.is_some_and(|held| held.clamps.is_some());
-        if gripped || clamped {
+        if gripped || clamped || !group.clone().all(|vein| self.is_pinned(vein)) {
             return None;
         }
         let tip = tip.map(|held| DVec3::from_array(held.position));
@@ -359,9 +362,8 @@ impl Scenario {
             let points = |apart: Vec<DVec3>| self.support_line(&group, &apart).is_some();
             !self.has_moments_on(&group) && apart.is_some_and(|apart| !points(apart))
         };
-        let hinged =
-            self.base_held == BaseSupport::Pinned && self.wind.is_none() && !self.has_followers();
-        hinged && self.tied_groups().into_iter().any(free)
+        let determined = self.wind.is_some() || self.has_followers();
+        !determined && self.tied_groups().into_iter().any(free)
     }
 
     /// Whether every coupling within a group has one stiffness in all directions across an axis: no
@@ -431,11 +433,16 @@ impl Scenario {
         let clamps = self.held_tip.as_ref().and_then(|tip| tip.clamps.as_ref());
         let clamp = clamps.map(|clamps| clamps[group.start].rotation() * DVec3::X);
         // Where grips hold a vein depends on how it begins in the natural leaf.
-        let free = self.base_held == BaseSupport::Pinned && grips.clone().next().is_none();
-        let axis = match self.base_held {
-            BaseSupport::Pinned if free => clamp?,
-            BaseSupport::Pinned if !gripped && clamp.is_none() => return None,
-            _ => tangent(rods.first()?),
+        let without_grips = grips.clone().next().is_none();
+        let free = |vein: usize| self.is_pinned(vein) && without_grips;
+        let axis = match group.clone().find(|vein| !free(*vein)) {
+            None => clamp?,
+            Some(_)
+                if !gripped && clamp.is_none() && group.clone().all(|it| self.is_pinned(it)) =>
+            {
+                return None;
+            }
+            Some(directed) => tangent(&self.rods[directed]),
         };
         let in_line = |direction: DVec3| direction.distance(axis) <= TOLERANCES.equality;
         let along = |load: [f64; 3]| is_along(DVec3::from_array(load), axis);
@@ -449,9 +456,11 @@ impl Scenario {
             .tissue
             .iter()
             .any(|all| all[gaps.clone()].iter().any(has_some));
-        let begins =
-            |rod: &Rod| (free || in_line(tangent(rod))) && is_along(rod.base_position(), axis);
-        let turns = rods.iter().all(begins)
+        let begins = |vein: usize| {
+            let rod = &self.rods[vein];
+            (free(vein) || in_line(tangent(rod))) && is_along(rod.base_position(), axis)
+        };
+        let turns = group.clone().all(begins)
             && !tissue
             && self.group_loads(&group).iter().all(|load| is_along(*load, axis))
             && grips.all(|grip| along(grip.displacement))

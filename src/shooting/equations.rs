@@ -65,8 +65,6 @@ pub struct BoundaryValueProblem<'a> {
     tip_moment: DVec3,
     /// Where the tips of the rods are held; empty if they are not.
     held_tips: Vec<Pose>,
-    /// Whether hinges hold the bases.
-    hinged: bool,
     /// The smallest couple stiffness along each rod.
     pub softest_couple_stiffness: Vec<f64>,
     /// Growth rate per sigma of perturbations of each rod due to coupling.
@@ -196,7 +194,6 @@ impl<'a> BoundaryValueProblem<'a> {
                     })
                 })
                 .collect(),
-            hinged: scenario.base_held != BaseSupport::Clamped,
             softest_couple_stiffness: softest,
             turnings: scenario.zero_energy_rotations(),
             arcs: rest_arcs(scenario, &lengths),
@@ -546,24 +543,28 @@ impl<'a> BoundaryValueProblem<'a> {
 }
 
 impl BoundaryValueProblem<'_> {
-    /// The first of the six components of a rod's perturbation that are free at its base: of the force
-    /// and the moment at a clamp, of the rotation and the force at a hinge.
-    pub fn first_free_component(&self) -> usize {
-        match self.hinged {
+    /// The first of the six components of the perturbation of rod `j` that are free at its base: of the
+    /// force and the moment at a clamp, of the rotation and the force at a hinge.
+    pub fn first_free_component(&self, j: usize) -> usize {
+        match self.base_turns(j) {
             true => 3,
             false => 6,
         }
     }
 
-    /// Whether the bases turn freely on their hinges.
-    pub fn turns_freely(&self) -> bool {
-        self.scenario.base_held == BaseSupport::Pinned
+    /// Whether the base of rod `j` turns, freely or against a spring.
+    pub fn base_turns(&self, j: usize) -> bool {
+        self.scenario.base_held[j] != BaseSupport::Clamped
+    }
+
+    /// Whether the base of rod `j` turns freely on a hinge.
+    pub fn base_turns_freely(&self, j: usize) -> bool {
+        self.scenario.base_held[j] == BaseSupport::Pinned
     }
 
     /// The stiffness of the spring at the base of rod `j`; zero without one.
     fn base_turn_stiffness(&self, j: usize) -> f64 {
-        let own = self.scenario.base_turn_stiffness.get(j);
-        own.map_or(0.0, |own| own / self.scenario.scale().moment())
+        self.scenario.base_spring_stiffness(j) / self.scenario.scale().moment()
     }
 
     /// The moment of the rod at a base with the rotation `q`: none at a hinge, that of its spring at an
@@ -594,7 +595,7 @@ impl BoundaryValueProblem<'_> {
     /// The state at the base nearest to a given one: a hinge carries no moment, or that of its spring.
     pub fn constrained_base(&self, j: usize, rod: &RodState) -> RodState {
         let clamped = self.base(j, rod.n, rod.m);
-        match self.hinged {
+        match self.base_turns(j) {
             true => RodState {
                 q: rod.q,
                 m: self.base_moment(j, rod.q),

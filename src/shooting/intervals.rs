@@ -192,10 +192,10 @@ pub fn responses(
             let (steps, j) = (&integrated[task / rods].steps, task % rods);
             match task < rods {
                 true => {
-                    let first = equations.first_free_component();
+                    let first = equations.first_free_component(j);
                     let rods = coupled_rods(equations, j);
                     let mut all = Perturbations::<6>::unit_perturbations(rods, j, first);
-                    if first == 3 {
+                    if equations.base_turns(j) {
                         // With a base turns the moment of its spring.
                         let q = RodState::from_flat_state(base, j).q;
                         all.add_moments_of_rotations(j, equations.base_moment_rate(j, q));
@@ -226,9 +226,10 @@ pub fn sensitivities(
     let rods = equations.rods();
     (responses.chunks(rods).enumerate())
         .map(|(k, columns)| {
-            let (kinds, first_kind) = match k {
-                0 => (6, equations.first_free_component()),
-                _ => (PERTURBATION_SIZE, 0),
+            let kinds = if k == 0 { 6 } else { PERTURBATION_SIZE };
+            let first_kind = |j: usize| match k {
+                0 => equations.first_free_component(j),
+                _ => 0,
             };
             let mut matrix = Mat::zeros(PERTURBATION_SIZE * rods, kinds * rods);
             let mut largest: f64 = 1.0;
@@ -236,7 +237,7 @@ pub fn sensitivities(
                 for (i, row) in response.rows.chunks(kinds).enumerate() {
                     let row_index = PERTURBATION_SIZE * response.first_rod + i;
                     for (k, value) in row.iter().enumerate() {
-                        let from = PERTURBATION_SIZE * j + first_kind + k;
+                        let from = PERTURBATION_SIZE * j + first_kind(j) + k;
                         matrix[(row_index, kinds * j + k)] =
                             value * units.component_unit(from) / units.component_unit(row_index);
                         if from % PERTURBATION_SIZE / 3 == row_index % PERTURBATION_SIZE / 3 {
@@ -384,7 +385,7 @@ pub struct CondensedEquations {
     determined: usize,
     tip: TipConstraint,
     /// The first of the components that are free at the base.
-    free_at_base: usize,
+    free_at_base: Vec<usize>,
     units: PerturbationUnits,
     /// Derivatives of what loads on points at the tips add to n and m there; empty if these do not depend on
     /// rotations.
@@ -431,7 +432,9 @@ impl CondensedEquations {
             right: svd.V().to_owned(),
             determined,
             tip,
-            free_at_base: equations.first_free_component(),
+            free_at_base: (0..equations.rods())
+                .map(|j| equations.first_free_component(j))
+                .collect(),
             units: units.clone(),
             tip_jumps,
         };
@@ -536,11 +539,9 @@ impl CondensedEquations {
             back_substitute(&self.growths[k], &mut free);
         }
         // At the base six components are free.
-        let first = self.free_at_base;
-        let rods = free.nrows() / 6;
-        let base = (0..rods).flat_map(|j| {
+        let base = self.free_at_base.iter().enumerate().flat_map(|(j, first)| {
             let free = &free;
-            (0..PERTURBATION_SIZE).map(move |k| match k.checked_sub(first) {
+            (0..PERTURBATION_SIZE).map(move |k| match k.checked_sub(*first) {
                 Some(k) if k < 6 => free[6 * j + k],
                 _ => 0.0,
             })

@@ -363,7 +363,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                 let [spin, _] = turning.node_velocity(rod.r, rod.q, self.equations.length_unit);
                 let own = &mut turn[PERTURBATION_SIZE * j..PERTURBATION_SIZE * (j + 1)];
                 // A clamp does not turn.
-                if self.equations.first_free_component() == 3 {
+                if self.equations.base_turns(j) {
                     own[3..6].copy_from_slice(&spin.to_array());
                 }
                 own[6..9].copy_from_slice(&force.to_array());
@@ -395,8 +395,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                 now: bases(j).q,
             };
             let begins: Vec<BaseRotations> = rods.clone().map(begin).collect();
-            let held = !self.equations.turns_freely();
-            let moments = held.then(|| rods.clone().map(|j| bases(j).m).sum());
+            let directed = (rods.clone()).filter(|j| !self.equations.base_turns_freely(*j));
+            let moments = directed.map(|j| bases(j).m).reduce(|sum, own| sum + own);
             let angle = turning.angle_to_representative(&begins, moments);
             let [turn, back] = turning.rotations(angle);
             let point = turning.point / self.equations.length_unit;

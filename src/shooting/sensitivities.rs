@@ -487,10 +487,10 @@ mod tests {
     fn at_the_base_six_components_are_perturbed() {
         let mut scenario = three();
         for (held, free) in [(BaseSupport::Clamped, 6), (BaseSupport::Pinned, 3)] {
-            scenario.base_held = held;
+            scenario.base_held[1] = held;
             let equations = BoundaryValueProblem::new(&scenario);
             let all = linear::<PERTURBATION_SIZE>(&equations, (1, 0));
-            let some = linear::<6>(&equations, (1, equations.first_free_component()));
+            let some = linear::<6>(&equations, (1, equations.first_free_component(1)));
             for (all, some) in all.rows().iter().zip(some.rows()) {
                 assert_eq!(all[free..free + 6], some[..]);
             }

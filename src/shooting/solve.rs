@@ -3,7 +3,7 @@
 
 use crate::homotopy::{StepEnd, StepSizes};
 use crate::run::UnmodelledFeature;
-use crate::scenario::{BaseSupport, Scenario, Wind, longest};
+use crate::scenario::{Scenario, Wind, longest};
 use crate::shape::{Difference, equally_spaced};
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::LeafTrajectory;
@@ -110,7 +110,7 @@ pub fn check_models(scenario: &Scenario, from_rest: bool) -> Result<(), Unmodell
     if scenario.foundation.is_some() {
         return from_arcs("a leaf on a foundation is led to rest by the relaxation");
     }
-    if scenario.base_held != BaseSupport::Clamped {
+    if !scenario.all_bases_clamped() {
         // Without loads the leaf of arcs turns about its hinges.
         return from_arcs("a leaf on hinges (leaf.base_held) is led to rest by the relaxation");
     }

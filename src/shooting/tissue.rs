@@ -18,7 +18,7 @@
 use crate::natural::Natural;
 use crate::rod::Wrench;
 use crate::rotation::Pose;
-use crate::scenario::{BaseSupport, Profile, RodPlace, Scenario, Tissue, longest};
+use crate::scenario::{Profile, RodPlace, Scenario, Tissue, longest};
 use glam::{DQuat, DVec3};
 use nalgebra::{SMatrix, SVector};
 use num_dual::{DualNum, jacobian};
@@ -111,7 +111,7 @@ pub fn rigid_tissue_obstacle(scenario: &Scenario) -> Option<&'static str> {
     if !has_rigid_tissue(scenario) {
         return None;
     }
-    if scenario.base_held != BaseSupport::Clamped {
+    if !scenario.all_bases_clamped() {
         return Some("bases on hinges (leaf.base_held): clamp them, or give finite stiffnesses");
     }
     let natural = Natural::new(scenario, scenario.tissue_grown);

@@ -34,7 +34,6 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    without_wind_or_followers(scenario, "a derivative")?;
     let values = values_of_keys(base, keys)?;
     let numbers = named_parameters(base, &values);
     let RelaxedLeaf {

@@ -31,7 +31,9 @@ use crate::branch::value_at_fraction;
 use crate::relax::Parameter;
 use crate::scenario;
 use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
-use crate::scenario::{Entries, EntryPath, Key, Scenario, ScenarioError, intended_number};
+use crate::scenario::{
+    BaseSupport, Entries, EntryPath, Key, Scenario, ScenarioError, intended_number,
+};
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -606,8 +608,7 @@ impl BaseScenario {
             }),
             value,
             unit,
-            // The stress-free leaf depends on shapes at rest otherwise.
-            linear: keys.is_scenario_linear() && !self.scenario().needs_stress_free_leaf(),
+            linear: keys.is_scenario_linear() && !has_nonlinear_forces(self.scenario()),
         }
     }
 
@@ -629,6 +630,13 @@ impl BaseScenario {
         let changed = self.entries.replaced(&overrides_for_values(values)).ok()?;
         Some(changed.to_toml())
     }
+}
+
+/// Whether forces on a leaf depend on numbers of its scenario otherwise than these say: by the stress-free leaf, by the
+/// turn of an elastic base from its natural direction, or by the square of the air's velocity.
+fn has_nonlinear_forces(scenario: &Scenario) -> bool {
+    let elastic = scenario.base_held.contains(&BaseSupport::Elastic);
+    scenario.needs_stress_free_leaf() || elastic || scenario.wind.is_some()
 }
 
 /// The overrides that set these values.

@@ -5,6 +5,7 @@ mod coverage;
 mod dialects;
 mod dialects_written;
 mod ends;
+mod followers;
 mod grips;
 mod hanging;
 mod lack_of_fit;

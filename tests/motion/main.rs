@@ -13,6 +13,7 @@ mod hinges;
 mod landing;
 mod moments;
 mod momentum;
+mod moved_rollers;
 mod off_axis;
 mod order;
 mod pulses;

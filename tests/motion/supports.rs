@@ -163,7 +163,7 @@ fn turned((external, internal): (f64, f64), elastic: bool) -> Scenario {
     rod.gravity = [0.0, 0.2, -0.5];
     rod.dynamics.gravity = Schedule::constant(rod.gravity);
     if elastic {
-        rod.base_held = leafdyn::scenario::BaseSupport::Elastic;
+        rod.base_held = vec![leafdyn::scenario::BaseSupport::Elastic];
         rod.base_turn_stiffness = vec![3.0];
     }
     move_base(&mut rod, course(0.5), course(2.0));

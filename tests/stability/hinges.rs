@@ -315,3 +315,138 @@ fn beams_on_elastic_roots_vibrate_as_they_should() {
         }
     }
 }
+
+/// A column along x that a strut, on a hinge across it, keeps from swaying; both are held by these words.
+const PROPPED: &str = r#"
+    name = "propped"
+    leaf = { rods = 2, length = 1.0, fan = [0.0, 1.5707963267948966], base = [[0.0, 0.0, 0.0], [1.0, -1.0, 0.0]], base_held = HELD }
+    stiffness = { torsion = 1.0, bending_2 = 1e4, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+    load = { tip_force = [0.0, 0.0, 0.0] }
+"#;
+
+/// A column of which the tip stays on its axis buckles where tan x = x/(1 + x^2/k) with the spring k L/EI at its
+/// base: at x = 4.4934 on a clamp, at pi on a hinge (S. Timoshenko and J. Gere, Theory of elastic stability). Out of
+/// the plane, where the strut on a hinge does not prop it, a stiff column on a spring leans at k L tan(k L) = c L/EI,
+/// P = EI k^2.
+#[test]
+fn propped_columns_buckle_by_what_holds_each() {
+    let on_spring = |k: f64| root(|x| x.sin() * (1.0 + x * x / k) - x * x.cos(), [3.2, 4.49]);
+    let leaning = |c: f64| {
+        let k = root(|k| k * k.sin() - 1e-4 * c * k.cos(), [1e-6, 0.5 * PI]);
+        (-1e4 * k * k, 1)
+    };
+    for (held, x, leans) in [
+        (r#"["clamped", "pinned"]"#, TAN[0], None),
+        (r#"["pinned", "clamped"]"#, PI, None),
+        (
+            r#"["elastic", "pinned"], base_turn_stiffness = 2.0"#,
+            on_spring(2.0),
+            Some(leaning(2.0)),
+        ),
+        (
+            r#"["elastic", "pinned"], base_turn_stiffness = 9.0"#,
+            on_spring(9.0),
+            Some(leaning(9.0)),
+        ),
+    ] {
+        let text = PROPPED.replace("HELD", held);
+        let wanted: Vec<_> = leans.into_iter().chain([(-x * x, 1)]).collect();
+        let vary = format!("load.tip_force[0]=-1..{}", -1.1 * x * x);
+        let found = follow(&text, "load.tip_force[0]=-1", &vary, false);
+        changes_at(held, &found, &wanted, 1e-6);
+    }
+}
+
+/// Veins that nothing ties vibrate as so many leaves of one vein do.
+#[test]
+fn veins_apart_vibrate_as_leaves_of_one_vein() {
+    let leaf = |rods: usize, fan: &str, held: &str| {
+        let text = format!(
+            r#"
+            name = "veins"
+            leaf = {{ rods = {rods}, length = 1.0, fan = {fan}, joined = false, base_held = {held}, base_turn_stiffness = 1.3 }}
+            stiffness = {{ torsion = 0.7, bending_2 = 1.0, bending_3 = 2.3, axial = 100.0, shear_2 = 60.0, shear_3 = 80.0 }}
+            load.gravity = [0.1, 0.0, -1.0]
+            dynamics = {{ density = 1.0, rotary_inertia = 0.01 }}
+            "#
+        );
+        let scenario = parse(&text);
+        let settings = Options {
+            modes: 6,
+            ..iterated(1e-12, 16)
+        };
+        let modes = settled(&scenario, &settings).stability.modes.unwrap();
+        modes.iter().map(|mode| mode.eigenvalue).collect::<Vec<_>>()
+    };
+    let together = leaf(2, "[0.2, -0.3]", r#"["clamped", "elastic"]"#);
+    let spring = leaf(1, "[-0.3]", r#"["elastic"]"#);
+    let clamp = {
+        let text = r#"
+            name = "vein"
+            leaf = { rods = 1, length = 1.0, fan = [0.2] }
+            stiffness = { torsion = 0.7, bending_2 = 1.0, bending_3 = 2.3, axial = 100.0, shear_2 = 60.0, shear_3 = 80.0 }
+            load.gravity = [0.1, 0.0, -1.0]
+            dynamics = { density = 1.0, rotary_inertia = 0.01 }
+        "#;
+        let settings = Options {
+            modes: 6,
+            ..iterated(1e-12, 16)
+        };
+        let modes = settled(&parse(text), &settings).stability.modes.unwrap();
+        modes.iter().map(|mode| mode.eigenvalue).collect::<Vec<_>>()
+    };
+    let mut apart = [spring, clamp].concat();
+    apart.sort_by(f64::total_cmp);
+    for (a, b) in together.iter().zip(&apart) {
+        assert!((a / b - 1.0).abs() < 1e-8, "{together:?} {apart:?}");
+    }
+}
+
+/// Beside clamps, what a hinge lets turn without resistance is told as on hinges alone: as many eigenvalues of the dense
+/// matrix, without a phase condition, are zero and negative as are told.
+#[test]
+fn counts_of_veins_held_in_several_ways_are_those_of_the_dense_matrix() {
+    const VEINS: &str = r#"
+        name = "veins"
+        leaf = { rods = 2, length = [1.0, 0.8], fan = [0.3, -0.4] }
+        stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.0, axial = 200.0, shear_2 = 100.0, shear_3 = 100.0 }
+        load = { gravity = [0.0, 0.0, -1.0] }
+        dynamics = { density = 1.0, rotary_inertia = 0.01 }
+    "#;
+    let clamp = "leaf.base_held=['clamped', 'pinned']";
+    let spring = "leaf.base_held=['elastic', 'pinned']; leaf.base_turn_stiffness=2.0";
+    let apart = "leaf.joined=false";
+    let in_line = "leaf.fan=[0.0, 0.0]; leaf.base=[[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]; \
+                   load.gravity=[0, 0, 0]; load.tip_force=[-14.0, 0.0, 0.0]";
+    let mut seen = Vec::new();
+    for (held, entries) in [
+        (clamp, ""),
+        (spring, ""),
+        (clamp, "stiffness.bending_3=2.0"),
+        (clamp, "stiffness.bending_3=2.0; rest.bend_3=0.5"),
+        (clamp, apart),
+        (clamp, in_line),
+        (spring, in_line),
+    ] {
+        let leaf = base(VEINS, &format!("{held}; {entries}"));
+        let scenario = leaf.scenario();
+        let found = settled(scenario, &iterated(1e-12, 16));
+        let own = Leaf::new(scenario);
+        let grid = discrete(&own, 16);
+        let linear = Linear::new(&grid, &Physics::new(&own), &state_of(scenario, &found));
+        let values = SymmetricEigen::new(linear.scaled()).eigenvalues;
+        let count = |of: &dyn Fn(f64) -> bool| values.iter().filter(|it| of(**it)).count();
+        let zero = count(&|value| value.abs() < 1e-5);
+        let what = format!("{held} {entries}: {values}");
+        assert_eq!(zero, found.stability.neutral_directions, "{what}");
+        let negative = count(&|value| value <= -1e-5);
+        assert_eq!(
+            found.stability.negative_eigenvalues,
+            Some(negative),
+            "{what}"
+        );
+        seen.push(zero);
+    }
+    assert_eq!(seen[..4], [1, 1, 0, 0], "{seen:?}");
+    assert!(seen.contains(&2), "{seen:?}");
+}

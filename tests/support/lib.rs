@@ -289,7 +289,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         dynamics: Dynamics::default_for(&veins).with_loads(gravity, [0.0; 3], [0.0; 3]),
         rods: veins,
         radii: Radii::default(),
-        base_held: BaseSupport::Clamped,
+        base_held: vec![BaseSupport::Clamped; rods],
         base_turn_stiffness: Vec::new(),
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],

@@ -284,18 +284,18 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
     marks.collect()
 }
 
-/// What holds a leaf: bases, of which those at one place are one, a tip, grips, and a foundation.
+/// What holds a leaf: bases, of which those at one place that are held alike are one, a tip, grips, and a foundation.
 pub fn support_marks(scenario: &Scenario) -> Vec<SupportMark> {
-    let mut bases: Vec<[f64; 3]> = Vec::new();
+    let mut bases: Vec<([f64; 3], BaseSupport)> = Vec::new();
     let mut marks = Vec::new();
-    for (rod, vein) in scenario.rods.iter().zip(1..) {
-        if !bases.contains(&rod.base) {
-            bases.push(rod.base);
+    for ((rod, held), vein) in scenario.rods.iter().zip(&scenario.base_held).zip(1..) {
+        if !bases.contains(&(rod.base, *held)) {
+            bases.push((rod.base, *held));
             marks.push(SupportMark {
                 part: ParsedKey::Base,
                 vein,
                 at: [0.0; 2],
-                held: match scenario.base_held {
+                held: match held {
                     BaseSupport::Clamped => SupportForm::Clamped,
                     BaseSupport::Pinned => SupportForm::Pinned,
                     BaseSupport::Elastic => SupportForm::Elastic,

@@ -49,7 +49,7 @@ const REFUSED: &str = "
     relax scenarios/motion/gust.toml --method shooting-from-rest => [wind]: shooting in wind that changes does not
     relax scenarios/motion/gust.toml --margin => [wind]: the margin does not
     relax scenarios/motion/gust.toml --all => [wind]: the search for all shapes does not
-    relax scenarios/motion/gust.toml --sensitivity leaf.length => [wind]: a derivative does not
+    relax scenarios/motion/gust.toml --sensitivity leaf.length => wind.velocity: a leaf comes to rest in steady wind only
     check scenarios/motion/gust.toml => [wind]: shooting in wind that changes does not
     trace scenarios/motion/gust.toml --vary leaf.length=20..30 => wind.velocity: a leaf comes to rest in steady wind only
     trace scenarios/motion/gust.toml --vary leaf.length=20..30 --vary section.young=1e5..2e5 => [wind]: a boundary of stability does not

@@ -99,7 +99,7 @@ class LeafTable(TypedDict, total=False):
     """``[leaf]``"""
 
     base: Numbers | Vectors
-    base_held: str
+    base_held: str | Sequence[str]
     base_turn_stiffness: float | Numbers
     elevation: float | Numbers
     fan: str | Numbers

@@ -386,6 +386,7 @@ impl DiscreteLeaf {
         }
         self.add_own_load_changes(state, each, forces);
         self.add_lever_changes(state, each, forces);
+        self.add_follower_changes(state, each, forces);
         self.add_spring_changes(state, each, forces);
         let terms: Vec<_> = each.iter().map(|it| (it.weight, &it.term)).collect();
         forces.energy += self.for_each_tissue_change(state, &terms, |j, i, load| {
@@ -418,6 +419,23 @@ impl DiscreteLeaf {
         }
     }
 
+    /// Adds the changes of loads that turn with the sections, and of moments along veins.
+    fn add_follower_changes(
+        &self,
+        state: &State,
+        each: &[Weighted<DiscreteLeaf>],
+        forces: &mut ParameterForces,
+    ) {
+        let nodes = self.moving_nodes();
+        for Weighted { weight, term } in each.iter().filter(|it| it.term.has_followers()) {
+            for (j, i) in self.rod_index_pairs(nodes.clone()) {
+                let load = term.follower_wrench(state, j, i);
+                let on = &mut forces.rod_forces_mut(j, nodes.len())[i - nodes.start];
+                add_to_increment(on, *weight * load.moment, *weight * load.force);
+            }
+        }
+    }
+
     /// Adds the changes of the springs of supports, in their stiffness and in where they have no force.
     fn add_spring_changes(
         &self,
@@ -445,6 +463,19 @@ impl DiscreteLeaf {
         let springs = self.springs.on_node(j * (self.segments() + 1) + i);
         let stiffness: DVec3 = springs.iter().map(|spring| spring.stiffness).sum();
         -stiffness * displacement_part(&response.nodes[j][i - self.first_node()])
+    }
+
+    /// The change of the force of loads that turn with the section of node `i` of rod `j`.
+    pub(super) fn follower_response(
+        &self,
+        state: &State,
+        j: usize,
+        i: usize,
+        response: &LinearResponse,
+    ) -> DVec3 {
+        let turn = rotation_part(&response.node_increment(self, j, i));
+        let q = state.q[state.base(j) + i];
+        self.node_follower(j, i).derivative(q, turn).force
     }
 
     /// Adds the changes of the forces of springs on their grips.

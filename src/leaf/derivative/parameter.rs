@@ -31,18 +31,19 @@ pub struct LeafParameterDerivative<'s> {
     pub(super) moments: Vec<PointMoment>,
     /// Rate of the place of the tips' holder, if that moves.
     pub(super) held: Option<TipSupportDerivative>,
-    /// The leaves that differ in the number, if they have tissue, springs at the bases, loads of single veins, or
-    /// grips.
+    /// The leaves that differ in the number, if they have tissue, springs at the bases, loads of single veins, loads
+    /// without a potential, or grips.
     pub(super) weighted_leaves: Vec<Weighted<Leaf>>,
 }
 
 /// The derivative of a rod, in the leaf's units.
 pub(super) struct RodParameterDerivative<'s> {
     pub(super) length: f64,
-    /// Rate of the place of a clamped base; zero for a hinged one.
+    /// Rate of the place of a clamped base without equations; zero for others.
     pub(super) base: NodeIncrement,
-    /// Rate of the position of a hinge; zero for a clamped base.
-    hinge: DVec3,
+    /// Rate of what is held of a base with equations: of the position of a hinge, of the place of a clamp
+    /// beside hinges; zero for others.
+    held_base: NodeIncrement,
     couple_stiffness: [ProfileDerivative<'s>; 3],
     force_stiffness: [ProfileDerivative<'s>; 3],
     rest_curvature: [ProfileDerivative<'s>; 3],
@@ -95,11 +96,14 @@ impl<'s> LeafParameterDerivative<'s> {
                 true => none,
                 false => base_rate(terms, j, scale.length),
             },
-            hinge: match leaf.hinged() {
-                true => base_rate(terms, j, scale.length),
-                false => none,
-            }
-            .displacement,
+            held_base: match (leaf.hinged(), leaf.base_turns(j)) {
+                (true, true) => NodeIncrement {
+                    rotation: DVec3::ZERO,
+                    ..base_rate(terms, j, scale.length)
+                },
+                (true, false) => base_rate(terms, j, scale.length),
+                (false, _) => none,
+            },
             couple_stiffness: [0, 1, 2].map(|k| {
                 ProfileDerivative::from_terms(terms, 1.0 / scale.stiffness, move |s| {
                     &s.rods[j].couple_stiffness[k]
@@ -136,9 +140,7 @@ impl<'s> LeafParameterDerivative<'s> {
             held: TipSupportDerivative::new(leaf, terms),
             weighted_leaves: match leaf.has_tissue()
                 || leaf.has_base_springs()
-                || terms
-                    .iter()
-                    .any(|it| it.term.has_own_loads() || it.term.needs_stress_free_leaf())
+                || terms.iter().any(|it| depends_on_whole_leaf(&it.term))
             {
                 true => weighted_leaves(leaf, terms),
                 false => Vec::new(),
@@ -148,9 +150,14 @@ impl<'s> LeafParameterDerivative<'s> {
 }
 
 impl LeafParameterDerivative<'_> {
-    /// The rate of displacement of the hinge of rod `j`.
-    pub(super) fn hinge_displacement_rate(&self, j: usize) -> DVec3 {
-        self.rods[j].hinge
+    /// The rate of what is held of the base of rod `j`, if that has equations.
+    pub(super) fn held_base_rate(&self, j: usize) -> NodeIncrement {
+        self.rods[j].held_base
+    }
+
+    /// The leaves that differ in the number, if all that changes is not told otherwise.
+    pub fn weighted_leaves(&self) -> &[Weighted<Leaf>] {
+        &self.weighted_leaves
     }
 
     /// Whether dead moments change.
@@ -158,7 +165,7 @@ impl LeafParameterDerivative<'_> {
         !self.moments.is_empty()
     }
 
-    /// The rate of the place of the base of rod `j` if it is clamped.
+    /// The rate of the place of the base of rod `j` if it is clamped and has no equations.
     pub fn base_motion_rate(&self, j: usize) -> NodeIncrement {
         self.rods[j].base
     }
@@ -418,7 +425,8 @@ fn moment_rates(terms: &[Weighted<Scenario>], unit: f64) -> Vec<PointMoment> {
             / unit
     };
     let points = terms[0].term.points.iter().enumerate();
-    let on_points = points.map(|(k, point)| PointMoment {
+    let dead = points.filter(|(_, point)| !point.follows);
+    let on_points = dead.map(|(k, point)| PointMoment {
         sigma: point.at,
         moment: rate(&|s| s.points[k].moment),
     });
@@ -428,6 +436,15 @@ fn moment_rates(terms: &[Weighted<Scenario>], unit: f64) -> Vec<PointMoment> {
     };
     let all = std::iter::once(on_tip).chain(on_points);
     all.filter(|it| it.moment != DVec3::ZERO).collect()
+}
+
+/// Whether the loads and supports of single veins, or loads without a potential, act on a leaf: their changes are
+/// weighted sums over whole leaves.
+fn depends_on_whole_leaf(scenario: &Scenario) -> bool {
+    scenario.has_own_loads()
+        || scenario.needs_stress_free_leaf()
+        || scenario.has_followers()
+        || scenario.wind.is_some()
 }
 
 /// The leaves of neighboring scenarios, in the units of `leaf`.

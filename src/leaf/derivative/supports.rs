@@ -32,11 +32,7 @@ impl DiscreteLeaf {
             }
         };
         for j in 0..self.rods() {
-            let hinge = NodeIncrement {
-                rotation: DVec3::ZERO,
-                displacement: rate.hinge_displacement_rate(j),
-            };
-            put(j, 0, hinge);
+            put(j, 0, rate.held_base_rate(j));
         }
         for (j, held) in (0..self.rods()).flat_map(|j| rate.held.iter().map(move |it| (j, it))) {
             put(j, n, held.tip_increment(j));
@@ -218,6 +214,7 @@ impl DiscreteLeaf {
                 force += carried(i);
             }
             force += self.spring_response(j, i, response);
+            force += self.follower_response(state, j, i, response);
             let free = self.freedom_without_tip_support(j, i);
             rates[held.grip] += force - free.of_displacement(force);
         }
@@ -234,11 +231,10 @@ impl DiscreteLeaf {
         response: &LinearResponse,
     ) -> DVec3 {
         let n = self.segments();
-        let founded = rate
-            .weighted_leaves
-            .iter()
-            .any(|it| it.term.has_foundation());
-        let each = match founded {
+        let mut leaves = rate.weighted_leaves.iter();
+        let differ =
+            leaves.any(|it| it.term.has_foundation() || it.term.scenario().has_followers());
+        let each = match differ {
             true => self.weighted_leaves_on_grid(rate),
             false => Vec::new(),
         };
@@ -251,7 +247,12 @@ impl DiscreteLeaf {
             let springs =
                 |it: &Weighted<DiscreteLeaf>| it.weight * it.term.spring_load(state, j, n).force;
             force += each.iter().map(springs).sum::<DVec3>();
+            let followers = |it: &Weighted<DiscreteLeaf>| {
+                it.weight * it.term.follower_wrench(state, j, n).force
+            };
+            force += each.iter().map(followers).sum::<DVec3>();
             force += self.spring_response(j, n, response);
+            force += self.follower_response(state, j, n, response);
         }
         force
     }

@@ -60,7 +60,8 @@ impl AppliedLoads {
         let dead = leaf.loads.rod_load_factor != 0.0;
         let moved = leaf.leaf.scenario().support_motion.is_some();
         let none = !leaf.has_tissue() && !dead && !leaf.has_springs() && !moved;
-        if none && wind.is_none() && !leaf.has_followers() {
+        let follows = leaf.has_followers() || leaf.leaf.scenario().has_followers_in_time();
+        if none && wind.is_none() && !follows {
             return None;
         }
         let array = || AlignedArray::zeros(layout.leaf_array_length());
@@ -77,14 +78,7 @@ impl AppliedLoads {
                 velocity: at_rest(),
                 earlier_velocity: at_rest(),
             }),
-            followers: vec![
-                FollowerOnNode::default();
-                if leaf.has_followers() {
-                    state.x.len()
-                } else {
-                    0
-                }
-            ],
+            followers: vec![FollowerOnNode::default(); if follows { state.x.len() } else { 0 }],
             state,
         })
     }
@@ -166,20 +160,20 @@ impl AppliedLoads {
         leaf.half_turn_since(&self.alignments, &self.state)
     }
 
-    /// Power of the wind, on the nodes that count, at the mean of the velocities before the last kick and of these.
+    /// Power of the wind, by the part of its force on a node that supports leave, at the mean of the velocities
+    /// before the last kick and of these.
     pub fn power_of_wind(
         &self,
         velocity: impl Fn(usize, usize) -> DVec3,
-        counts: impl Fn(usize) -> bool,
+        free_part: impl Fn(usize, DVec3) -> DVec3,
     ) -> f64 {
         let Some(blown) = &self.nodes_in_wind else {
             return 0.0;
         };
         let nodes = self.state.segments() + 1;
         let forces = blown.forces.iter().zip(&blown.velocity).enumerate();
-        let forces = forces.filter(|(k, _)| counts(*k));
         let power = forces.map(|(k, (force, before))| {
-            force.dot(0.5 * (*before + velocity(k / nodes, k % nodes)))
+            free_part(k, *force).dot(0.5 * (*before + velocity(k / nodes, k % nodes)))
         });
         power.sum()
     }

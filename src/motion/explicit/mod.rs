@@ -197,6 +197,7 @@ impl Explicit {
         let tip_weight = |j| leaf.grid.node_weight(last) * leaf.leaf.length(j);
         let layout = packs::layout(&leaf);
         let positions = packs::positions(&leaf, state, layout);
+        let supports = MovingSupports::new(&leaf, &physics);
         let mut explicit = Explicit {
             arch: widest_arch(),
             packs: packs::packs_at_rest(&leaf, &physics, state, layout),
@@ -204,11 +205,11 @@ impl Explicit {
             positions,
             layout,
             applied: AppliedLoads::new(&leaf, &physics, state, layout),
-            supports: MovingSupports::new(&leaf, &physics),
             moments: StepDeadMoments::default(),
             lever_work: LeverWork::default(),
             block: BlockForces::new(),
-            sliding: packs::sliding_nodes(&leaf, state, layout),
+            sliding: packs::sliding_nodes(&leaf, state, layout, &supports),
+            supports,
             tip_mass: joined.then(|| (0..count).map(tip_mass).sum()),
             tip_load_length: (0..count).map(tip_weight).sum(),
             step: 0.0,
@@ -407,7 +408,7 @@ impl Explicit {
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_followers(self.layout, &self.packs);
-            let free = |k: usize| !MovingSupports::holds(&self.supports, k, 1);
+            let free = |k: usize, force: DVec3| MovingSupports::free_part(&self.supports, k, force);
             work += length * applied.power_of_wind(|j, i| self.momentum(j, i).velocity, free);
         }
         work += length * self.moments.power(self.layout, &self.packs);
@@ -424,20 +425,26 @@ impl Explicit {
         }
     }
 
-    /// Puts nodes that slide back to where they are held along the other axes, without velocity there;
-    /// returns twice the kinetic energy that those components had in the middle of the kick, at half of
-    /// their velocity.
+    /// Puts nodes that slide back to where they are held along the other axes after a drift, with the velocity of
+    /// their support; returns twice the kinetic energy that those components had in the middle of the kick, at the
+    /// mean of their velocities before and after it.
     fn return_sliding_nodes(&mut self) -> f64 {
         let mut energy = 0.0;
-        for sliding in &self.sliding {
+        for sliding in &mut self.sliding {
             let PackPosition { pack, entry } = sliding.place;
             let mass = self.packs[pack].mass(entry);
+            let moving = sliding.support.zip(self.supports.as_ref());
+            let (position, held) = match moving.map(|(number, supports)| &supports.nodes[number]) {
+                Some(it) => (it.now.position, it.step_velocity),
+                None => (sliding.position, DVec3::ZERO),
+            };
             for axis in (0..3).filter(|axis| sliding.held_axes.test(*axis)) {
                 let velocity = &mut self.packs[pack].motion.v[axis][entry];
-                energy += mass * (0.5 * *velocity).powi(2);
-                *velocity = 0.0;
-                self.positions[axis][sliding.node] = sliding.position[axis];
+                energy += mass * (0.5 * (sliding.velocity[axis] + *velocity)).powi(2);
+                *velocity = held[axis];
+                self.positions[axis][sliding.node] = position[axis];
             }
+            sliding.velocity = held;
         }
         energy
     }
@@ -620,7 +627,7 @@ impl TimeIntegrator for Explicit {
         let past = self.applied.as_ref().map(AppliedLoads::past_velocities);
         let path = (self.positions.clone(), moving);
         let (time, steps, work) = (self.last_step_time, self.past, self.work);
-        let supports = self.supports.clone();
+        let (supports, sliding) = (self.supports.clone(), self.sliding.clone());
         let mut exchange = Exchange::default();
         let left = self.clock.time - self.last_step_time;
         if left > TIME_ROUNDING_FRACTION * self.step {
@@ -637,7 +644,8 @@ impl TimeIntegrator for Explicit {
             .collect();
         if let Some(supports) = &self.supports {
             for it in &supports.nodes {
-                velocity[it.index].linear = it.velocity.linear;
+                let linear = &mut velocity[it.index].linear;
+                *linear = DVec3::select(it.held_axes, it.velocity.linear, *linear);
                 if it.holds_rotation {
                     velocity[it.index].angular = it.velocity.angular;
                 }
@@ -660,7 +668,7 @@ impl TimeIntegrator for Explicit {
             &state,
             &velocity,
         );
-        self.supports = supports;
+        (self.supports, self.sliding) = (supports, sliding);
         if let Some(supports) = &mut self.supports {
             supports.move_to(self.last_step_time, &mut self.leaf);
         }

@@ -7,6 +7,7 @@ use crate::motion::explicit::layout::{
     AlignedArray, BlockMaterial, NODES_PER_BLOCK, NodeData, PackLayout, PackPosition,
     material_blocks, vector_at,
 };
+use crate::motion::moving_supports::MovingSupports;
 use crate::motion::physics::Physics;
 use glam::{BVec3, DQuat, DVec3};
 use std::sync::Arc;
@@ -40,19 +41,34 @@ impl Pack {
 /// A node that a grip holds along some lab axes and lets slide along the others.
 #[derive(Clone, Copy, Debug)]
 pub struct SlidingNode {
+    /// Number of the support among those that move, if it does.
+    pub support: Option<usize>,
     pub place: PackPosition,
     /// Its number among the positions.
     pub node: usize,
     pub held_axes: BVec3,
     /// Where it is held.
     pub position: DVec3,
+    /// The velocity of its support in the last step.
+    pub velocity: DVec3,
 }
 
-/// The nodes of a leaf that slide.
-pub fn sliding_nodes(leaf: &DiscreteLeaf, state: &State, layout: PackLayout) -> Vec<SlidingNode> {
+/// The nodes of a leaf that slide, some on supports that move.
+pub fn sliding_nodes(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    layout: PackLayout,
+    supports: &Option<MovingSupports>,
+) -> Vec<SlidingNode> {
+    let support = |j: usize, i: usize| {
+        let mut moving = supports.iter().flat_map(|it| &it.nodes);
+        moving.position(|it| (it.rod, it.node) == (j, i))
+    };
     let node = |(j, i): (usize, usize)| {
         let held_axes = !leaf.node_freedom(j, i).displacement;
         (held_axes.any() && !held_axes.all()).then(|| SlidingNode {
+            support: support(j, i),
+            velocity: DVec3::ZERO,
             place: layout.pack_position(j, i),
             node: layout.node_index(j, i),
             held_axes,

@@ -1,5 +1,6 @@
 //! Supports that move, in explicit steps: their nodes are put where they are at the end of each step, and the work of the
-//! holders is that of the forces at each time over the halves of the steps before and after it.
+//! holders is that of the forces at each time over the halves of the steps before and after it. Nodes that slide move with
+//! the others of their kind, along axes in which they are free.
 
 use crate::leaf::{DiscreteLeaf, State};
 use crate::motion::NodeMotionComponents;
@@ -52,6 +53,7 @@ impl Explicit {
         };
         for it in &mut supports.nodes {
             it.load = support_load(&self.leaf, &applied.state, it);
+            it.spring_force = it.force_of_springs(&self.leaf, applied.state.x[it.index]);
         }
     }
 
@@ -72,21 +74,18 @@ impl Explicit {
                 true => it.last_step,
                 false => NodeMotionComponents::default(),
             };
-            let force = it.load.force + DVec3::from(own.force);
+            let force = it.force_on_support(it.load.force + DVec3::from(own.force));
             let mut moment = it.load.moment;
             if it.holds_rotation {
                 moment += DVec3::from(own.moment);
             }
             work -= 0.5 * force.dot(last.displacement + step.displacement);
             work -= 0.5 * moment.dot(last.rotation + step.rotation);
-            let velocity = match drift > 0.0 {
-                true => step.displacement / drift,
-                false => it.velocity.linear,
-            };
             let at = self.layout.node_index(it.rod, it.node);
-            for c in 0..3 {
+            it.step_velocity = it.mean_step_velocity(drift);
+            for c in (0..3).filter(|_| !it.slides()) {
                 self.positions[c][at] = it.now.position[c];
-                pack.motion.v[c][entry] = velocity[c];
+                pack.motion.v[c][entry] = it.step_velocity[c];
             }
             if it.holds_rotation {
                 let before = pack.quaternion(entry);

@@ -14,7 +14,7 @@ impl SemiImplicit {
     pub(super) fn step_energy_exchange(&mut self, h: f64) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
-            work: self.varying_load_work(h) + self.work_of_wind(h) + self.work_of_followers(),
+            work: self.varying_load_work(h) + self.work_of_wind(h) + self.work_of_followers(h),
         };
         exchange.work += self.work_of_supports();
         if self.physics.retardation > 0.0 {
@@ -99,39 +99,44 @@ impl SemiImplicit {
             let mean = |c: usize| 0.5 * (before.v[c] + after.v[c]);
             let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
             let shift = self.state.x[k] - self.trial.x[k];
-            if !MovingSupports::holds(&self.supports, k, 0) {
+            let shift = MovingSupports::free_part(&self.supports, k, shift);
+            if !MovingSupports::holds_rotation(&self.supports, k) {
                 sum += turn.dot(inertia.tensor(self.state.q[k]) * mean(0));
             }
-            if !MovingSupports::holds(&self.supports, k, 1) {
-                sum += inertia.mass * shift.dot(mean(1));
-            }
+            sum += inertia.mass * shift.dot(mean(1));
             if inertia.is_off_axis() {
                 let s = inertia.first_moment(self.state.q[k]);
-                if !MovingSupports::holds(&self.supports, k, 0) {
+                if !MovingSupports::holds_rotation(&self.supports, k) {
                     sum += turn.dot(s.cross(mean(1)));
                 }
-                if !MovingSupports::holds(&self.supports, k, 1) {
-                    sum += shift.dot(mean(0).cross(s));
-                }
+                sum += shift.dot(mean(0).cross(s));
             }
         }
         sum
     }
 
-    /// Work of the loads that turn with the sections, and of moments along veins, in the accepted step,
+    /// Work of the loads that turn with the sections, and of moments along veins, in the accepted step of `h`,
     /// from the trial: the mean of the loads before and after it, times the displacement.
-    fn work_of_followers(&self) -> f64 {
+    fn work_of_followers(&mut self, h: f64) -> f64 {
         if !self.leaf.has_followers() {
             return 0.0;
         }
+        let (from, to) = (self.clock.time, self.clock.time + h);
+        self.physics.apply_loads(&mut self.leaf, from);
+        let before = self.follower_work(&self.trial);
+        self.physics.apply_loads(&mut self.leaf, to);
+        0.5 * (before + self.follower_work(&self.state))
+    }
+
+    /// The work that the present loads without a potential, as they are turned in a state, would do in the accepted
+    /// step, from the trial.
+    fn follower_work(&self, turned: &State) -> f64 {
         let work = |(j, i)| {
             let k = self.state.base(j) + i;
-            let [before, after] =
-                [&self.trial, &self.state].map(|state| self.leaf.follower_wrench(state, j, i));
+            let load = self.leaf.follower_wrench(turned, j, i);
             let turn = rotation::log(self.state.q[k] * self.trial.q[k].conjugate());
             let shift = self.state.x[k] - self.trial.x[k];
-            0.5 * ((before.moment + after.moment).dot(turn)
-                + (before.force + after.force).dot(shift))
+            load.moment.dot(turn) + load.force.dot(shift)
         };
         let nodes = self.leaf.rod_index_pairs(self.leaf.moving_nodes());
         nodes.map(work).sum()
@@ -147,9 +152,9 @@ impl SemiImplicit {
         let pairs = before.zip(after).map(|(((j, i), before), (_, after))| {
             let node = self.state.base(j) + i;
             // What presses on a support that moves does no work on the leaf.
-            let moved = |k: usize| match MovingSupports::holds(&self.supports, k, 1) {
-                true => DVec3::ZERO,
-                false => self.state.x[k] - self.trial.x[k],
+            let moved = |k: usize| {
+                let shift = self.state.x[k] - self.trial.x[k];
+                MovingSupports::free_part(&self.supports, k, shift)
             };
             let force = 0.5 * (before.force() + after.force());
             force.dot(0.5 * (moved(node) + moved(node + 1)))

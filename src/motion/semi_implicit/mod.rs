@@ -619,6 +619,30 @@ impl SemiImplicit {
                 self.node_motions[*node].a[0] += tensor.inverse() * change;
             }
         }
+        for it in &scheduled.followers {
+            let k = self.state.base(it.rod) + it.node;
+            if self.is_off_axis_body(k) {
+                continue;
+            }
+            let q = self.state.q[k];
+            let change = (it.load * self.factor_changes[it.factor]).wrench(q);
+            if self.leaf.node_freedom(it.rod, it.node).rotation {
+                let tensor = self.inertia[k].tensor(q);
+                self.node_motions[k].a[0] += tensor.inverse() * change.moment;
+            }
+            let nodes = match together && it.node == n {
+                true => 0..rods,
+                false => it.rod..it.rod + 1,
+            };
+            let mass: f64 = { nodes.clone() }
+                .map(|j| self.inertia[self.state.base(j) + it.node].mass)
+                .sum();
+            for j in nodes {
+                let free = self.leaf.node_freedom(j, it.node);
+                let linear = free.of_displacement(change.force / mass);
+                self.node_motions[self.state.base(j) + it.node].a[1] += linear;
+            }
+        }
     }
 
     /// Adds the accelerations of free nodes under these loads.
@@ -698,23 +722,25 @@ impl SemiImplicit {
 fn set_support_motions(supports: &Option<MovingSupports>, motions: &mut [NodeMotion]) {
     for it in supports.iter().flat_map(|supports| &supports.nodes) {
         let motion = &mut motions[it.index];
-        let velocities = [it.velocity.angular, it.velocity.linear];
-        for c in usize::from(!it.holds_rotation)..2 {
-            motion.v[c] = velocities[c];
-            (motion.a[c], motion.w[c]) = (DVec3::ZERO, DVec3::ZERO);
+        if it.holds_rotation {
+            motion.v[0] = it.velocity.angular;
+            (motion.a[0], motion.w[0]) = (DVec3::ZERO, DVec3::ZERO);
+        }
+        motion.v[1] = DVec3::select(it.held_axes, it.velocity.linear, motion.v[1]);
+        for rate in [&mut motion.a[1], &mut motion.w[1]] {
+            *rate = DVec3::select(it.held_axes, DVec3::ZERO, *rate);
         }
     }
 }
 
 /// The moment and the force on node `k` without those that a support that moves takes.
 fn free_wrench(supports: &Option<MovingSupports>, k: usize, on_node: Wrench) -> Wrench {
-    let free = |component: usize, of: DVec3| match MovingSupports::holds(supports, k, component) {
-        true => DVec3::ZERO,
-        false => of,
-    };
     Wrench {
-        moment: free(0, on_node.moment),
-        force: free(1, on_node.force),
+        moment: match MovingSupports::holds_rotation(supports, k) {
+            true => DVec3::ZERO,
+            false => on_node.moment,
+        },
+        force: MovingSupports::free_part(supports, k, on_node.force),
     }
 }
 

@@ -48,7 +48,7 @@ impl SemiImplicit {
         let nodes = self.leaf.segments() + 1;
         let body = |&k: &usize| {
             let mut free = self.leaf.node_freedom(k / nodes, k % nodes);
-            free.rotation &= !MovingSupports::holds(&self.supports, k, 0);
+            free.rotation &= !MovingSupports::holds_rotation(&self.supports, k);
             NodeBody {
                 inertia: self.inertia[k],
                 rotation: self.state.q[k],
@@ -131,6 +131,12 @@ impl SemiImplicit {
             .filter(|(_, it)| (0, it.node) == (j, i))
         {
             change.moment += self.factor_changes[*factor] * it.moment;
+        }
+        let followers = scheduled.followers.iter();
+        for it in followers.filter(|it| (it.rod, it.node) == (j, i)) {
+            let turned = (it.load * self.factor_changes[it.factor]).wrench(q);
+            change.moment += turned.moment;
+            change.force += turned.force;
         }
         change
     }

@@ -5,7 +5,9 @@
 //! but from a short step, and velocities are the nearest ones with which these segments keep their lengths: impulses in
 //! them act in no time.
 
+use crate::leaf::{DiscreteLeaf, State};
 use crate::motion::constraint_projection::project_constraints;
+use crate::motion::moving_supports::MovingNode;
 use crate::motion::physics::Inertia;
 use crate::motion::semi_implicit::{
     NodeMotion, SemiImplicit, add_inertia, free_wrench, set_support_motions,
@@ -327,7 +329,7 @@ impl SemiImplicit {
             let inertia = &self.inertia;
             supports.kinetic_energy = supports.kinetic_energy(|it| inertia[it.index]);
             for it in &mut supports.nodes {
-                it.load = self.leaf.support_load(&self.state, it.rod, it.node);
+                it.load = load_on_support(&self.leaf, &self.state, it);
             }
         }
     }
@@ -373,12 +375,22 @@ impl SemiImplicit {
         let kinetic = supports.kinetic_energy(|it| inertia[it.index]);
         let mut work = kinetic - std::mem::replace(&mut supports.kinetic_energy, kinetic);
         for it in &mut supports.nodes {
-            let load = self.leaf.support_load(&self.state, it.rod, it.node);
+            let load = load_on_support(&self.leaf, &self.state, it);
             let step = it.step();
             work -= 0.5 * (load.force + it.load.force).dot(step.displacement);
             work -= 0.5 * (load.moment + it.load.moment).dot(step.rotation);
             it.load = load;
         }
         work
+    }
+}
+
+/// What the leaf exerts on a support that moves.
+fn load_on_support(leaf: &DiscreteLeaf, state: &State, it: &mut MovingNode) -> Wrench {
+    let load = leaf.support_load(state, it.rod, it.node);
+    it.spring_force = it.force_of_springs(leaf, state.x[it.index]);
+    Wrench {
+        force: it.force_on_support(load.force),
+        ..load
     }
 }

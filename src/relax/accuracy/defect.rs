@@ -437,7 +437,8 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
             (node.m.x, node.m.z) = (0.0, 0.0);
         }
     }
-    for (j, rod) in known.iter_mut().enumerate().filter(|_| leaf.leaf.hinged()) {
+    let turning = |(j, _): &(usize, &mut Vec<RodFields>)| leaf.leaf.base_turns(*j);
+    for (j, rod) in known.iter_mut().enumerate().filter(turning) {
         rod[0].m = leaf.leaf.base_spring_moment(j, rod[0].q);
     }
     let mut tips: Vec<_> = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();

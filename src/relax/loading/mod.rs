@@ -291,7 +291,7 @@ impl<'w> LoadPath<'w> {
         for j in 0..last.rods() {
             let base = last.base(j);
             self.next.x[base] = last.x[base];
-            if !self.loading.leaf.leaf.hinged() {
+            if !self.loading.leaf.leaf.base_turns(j) {
                 self.next.q[base] = last.q[base];
             }
         }

@@ -7,7 +7,7 @@ use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richa
 use crate::relax::accuracy::transfer::{GridLevel, NodalResultants};
 use crate::relax::accuracy::{FieldErrors, NestedEquilibrium};
 use crate::rod::Wrench;
-use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
+use crate::scenario::{BaseSupport, Grip, Moduli, Scenario, Stress, SupportKind};
 use crate::shape::{RodShape, STATION_TOLERANCE};
 use glam::DVec3;
 use serde::Serialize;
@@ -107,19 +107,22 @@ pub struct BaseReactions {
 }
 
 impl BaseReactions {
-    /// Those on bases at these `places`, from force and moment on each and bounds on the errors of any force
-    /// and of any moment; all in the units of the scenario.
+    /// Those on bases at these `places` that are `held` so, from force and moment on each and bounds on the
+    /// errors of any force and of any moment; all in the units of the scenario.
     pub fn from_each(
         places: &[DVec3],
         on_bases: &[Wrench],
-        hinged: bool,
+        held: &[BaseSupport],
         [error, moment_error]: [f64; 2],
     ) -> Self {
-        let each = on_bases.iter().map(|on_base| BaseReaction {
-            force: on_base.force,
-            error: Some(error),
-            moment: (!hinged).then_some(on_base.moment),
-            moment_error: (!hinged).then_some(moment_error),
+        let each = on_bases.iter().zip(held).map(|(on_base, held)| {
+            let directed = *held != BaseSupport::Pinned;
+            BaseReaction {
+                force: on_base.force,
+                error: Some(error),
+                moment: directed.then_some(on_base.moment),
+                moment_error: directed.then_some(moment_error),
+            }
         });
         let all = resultant(places, on_bases);
         let bound = Wrench {
@@ -158,17 +161,19 @@ struct IntegratedBases {
 
 impl IntegratedBases {
     fn new(leaf: &DiscreteLeaf, FieldErrors { estimate, safety }: FieldErrors) -> Self {
-        let on_clamp = |moment: DVec3| match leaf.leaf.turns_freely() {
+        let on_base = |j: usize, moment: DVec3| match leaf.leaf.base_turns_freely(j) {
             true => DVec3::ZERO,
             false => moment,
         };
-        let wrenches = estimate.rods.iter().map(|rod| Wrench {
+        let rods = estimate.rods.iter().enumerate();
+        let wrenches = rods.map(|(j, rod)| Wrench {
             force: rod[0].n,
-            moment: on_clamp(rod[0].m + leaf.dead_moment_on_clamp()),
+            moment: on_base(j, rod[0].m + leaf.dead_moment_on_clamp()),
         });
-        let errors = estimate.errors.iter().map(|rod| Wrench {
+        let errors = estimate.errors.iter().enumerate();
+        let errors = errors.map(|(j, rod)| Wrench {
             force: safety * rod[0].force,
-            moment: on_clamp(safety * rod[0].moment),
+            moment: on_base(j, safety * rod[0].moment),
         });
         let errors: Vec<Wrench> = errors.collect();
         IntegratedBases {
@@ -374,7 +379,7 @@ impl NestedEquilibrium {
     /// What the leaf exerts on the supports of its bases.
     pub fn base_reactions(&self) -> BaseReactions {
         let leaf = &self.levels[0].leaf;
-        let (scale, hinged) = (leaf.leaf.scale, leaf.leaf.turns_freely());
+        let scale = leaf.leaf.scale;
         let places: Vec<DVec3> = (0..leaf.rods())
             .map(|j| leaf.leaf.base_pose(j).position)
             .collect();
@@ -409,12 +414,15 @@ impl NestedEquilibrium {
         let [forces, moments] = state_wrenches(&series, integrated, [noise; 2]);
         let [force, moment] = state_wrenches(&of_all, integrated_of_all, sums);
         let bar = |error: Option<f64>, unit: f64| error.map(|error| safety * error * unit);
-        let each = forces.value.iter().zip(&moments.value);
-        let each = each.map(|(force, moment)| BaseReaction {
-            force: *force * scale.force(),
-            error: bar(forces.error, scale.force()),
-            moment: (!hinged).then(|| *moment * scale.moment()),
-            moment_error: bar(moments.error, scale.moment()).filter(|_| !hinged),
+        let each = forces.value.iter().zip(&moments.value).enumerate();
+        let each = each.map(|(j, (force, moment))| {
+            let directed = !leaf.leaf.base_turns_freely(j);
+            BaseReaction {
+                force: *force * scale.force(),
+                error: bar(forces.error, scale.force()),
+                moment: directed.then(|| *moment * scale.moment()),
+                moment_error: bar(moments.error, scale.moment()).filter(|_| directed),
+            }
         });
         BaseReactions {
             each: each.collect(),

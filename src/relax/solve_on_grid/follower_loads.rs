@@ -109,6 +109,25 @@ impl<'a> WithoutPotential<'a> {
         }
     }
 
+    /// Adds the change of the drag as clamped bases, which have no equations, are displaced at these rates.
+    pub fn add_base_motion(
+        &self,
+        state: &State,
+        rate: impl Fn(usize) -> DVec3,
+        forces: &mut NodalField,
+    ) {
+        let Some(wind) = self.wind.as_ref().filter(|wind| wind.first > 0) else {
+            return;
+        };
+        for ((j, _), drag) in wind.drags(state).filter(|((_, i), _)| *i == 0) {
+            let half = drag.chord_derivative() * (-0.5 * rate(j));
+            for (node, free) in wind.free_segment_ends(j, 0) {
+                let on = &mut forces[j][node - wind.first];
+                add_to_increment(on, DVec3::ZERO, free.of_displacement(half));
+            }
+        }
+    }
+
     /// The drag on all nodes.
     pub fn wind_forces(&self, state: &State) -> Vec<DVec3> {
         let mut forces = vec![DVec3::ZERO; state.x.len()];

@@ -246,6 +246,19 @@ impl<'e> EntryValue<'e> {
         word.ok_or_else(|| self.value_error(allowed))
     }
 
+    /// One of the words that `allowed` names for each of `rods` rods: one for all, or a list.
+    pub fn word_for_each<T: FromStr + Clone>(
+        &self,
+        rods: usize,
+        allowed: &str,
+    ) -> ScenarioResult<Vec<T>> {
+        if !self.value.is_array() {
+            return Ok(vec![self.word(allowed)?; rods]);
+        }
+        let list = self.list_of_length(rods, ONE_PER_ROD, "a word or a list of words")?;
+        list.map(|item| item.word(allowed)).collect()
+    }
+
     /// `true` or `false`.
     pub fn switch(&self) -> ScenarioResult<bool> {
         (self.value.as_bool()).ok_or_else(|| self.value_error("must be true or false"))

@@ -69,8 +69,8 @@ keys! {
     Base "leaf.base": VectorPerRod, [1, 0, 0], Default("[0.0, 0.0, 0.0]");
     /// angles of the rods at the base above the x-y plane, in radians.
     Elevation "leaf.elevation": PerRod(Finite), [0, 0, 0], Default("0.0");
-    /// how the bases are held: "clamped"; "pinned", by hinges that leave their directions free; or "elastic", their directions by springs.
-    BaseHeld "leaf.base_held": Text, [0, 0, 0], Default("\"clamped\"");
+    /// how the bases are held, one word for all or one each: "clamped"; "pinned", by hinges that leave their directions free; or "elastic", their directions by springs.
+    BaseHeld "leaf.base_held": TextPerRod, [0, 0, 0], Default("\"clamped\"");
     /// of elastic bases, the moment per angle by which a base has turned from its natural direction.
     BaseTurnStiffness "leaf.base_turn_stiffness": PerRod(Positive), [1, 1, 0], Derived;
     /// A1, against torsion.
@@ -167,7 +167,7 @@ keys! {
     TipForce "load.tip_force": Vector, [0, 1, 0], Default("[0.0, 0.0, 0.0]");
     /// dead moment on the tip, one rod only.
     TipMoment "load.tip_moment": Vector, [1, 1, 0], Default("[0.0, 0.0, 0.0]");
-    /// factor in time of gravity, of `load.g` and of distributed loads; at rest that of time 0.
+    /// factor in time of gravity, of `load.g`, and of loads and moments along the rods; at rest that of time 0.
     LoadFactor "load.factor": FactorInTime, [0, 0, 0], Derived;
     /// the rod that is loaded at a point, counted from 1.
     PointVein "load.point.vein": Whole, [0, 0, 0], Required("1");
@@ -436,6 +436,8 @@ pub(super) fn table_header(table: &str) -> String {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum ValueSchema {
     Text,
+    /// A word for all rods, or a list with one for each.
+    TextPerRod,
     /// `true` or `false`.
     Switch,
     /// A whole number from 1.

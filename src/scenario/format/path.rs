@@ -102,7 +102,11 @@ impl EntryPath {
         let (form, path, index) = (self.key.form(), self.key.path(), self.indices[0]);
         let single = matches!(
             form,
-            ValueSchema::Text | ValueSchema::Switch | ValueSchema::Whole | ValueSchema::WholeOrList
+            ValueSchema::Text
+                | ValueSchema::TextPerRod
+                | ValueSchema::Switch
+                | ValueSchema::Whole
+                | ValueSchema::WholeOrList
         );
         match form {
             _ if single && self.scale => Err("has no numbers that could be scaled".into()),
@@ -145,7 +149,7 @@ impl EntryPath {
         let list = || Err(format!("is a list: give an index, as in {within}[0]"));
         match self.key.form() {
             _ if self.scale => Ok(()),
-            ValueSchema::Text | ValueSchema::Switch => {
+            ValueSchema::Text | ValueSchema::TextPerRod | ValueSchema::Switch => {
                 Err("takes no number that could vary".into())
             }
             ValueSchema::VectorInTime | ValueSchema::FactorInTime | ValueSchema::BaseMotion

@@ -54,6 +54,10 @@ fn table_schema(name: &str) -> Value {
 fn entry_schema(key: Key) -> Value {
     let mut entry = match key.form() {
         ValueSchema::Text => json!({ "type": "string" }),
+        ValueSchema::TextPerRod => {
+            let text = json!({ "type": "string" });
+            json!({ "anyOf": [text, list_schema(text.clone())] })
+        }
         ValueSchema::Switch => json!({ "type": "boolean" }),
         ValueSchema::Whole => json!({ "type": "integer", "minimum": 1 }),
         ValueSchema::WholeOrList => {

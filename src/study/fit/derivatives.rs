@@ -211,7 +211,8 @@ impl CaseSolution {
     /// respect to all numbers. `None` if solving for each number takes no more work.
     pub fn measured_tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
         let leaf = &self.equilibrium.levels[0].leaf;
-        let symmetric = !leaf.leaf.has_placed_supports() && !leaf.has_moments();
+        let symmetric =
+            !leaf.leaf.has_placed_supports() && !leaf.has_moments() && !leaf.has_followers();
         let tip = |component: &ScalarDatum| match component.quantity {
             DatumQuantity::Result(MeasuredQuantity::Tip(axis)) => Some(axis),
             _ => None,

@@ -22,8 +22,8 @@ pub(super) mod result;
 mod statistics;
 pub(super) mod table;
 
-use crate::relax::{Options, RelaxError, check_tolerance, without_wind_or_followers};
-use crate::run::{Instant, Limit};
+use crate::relax::{Options, RelaxError, check_tolerance};
+use crate::run::{Instant, Limit, UnmodelledFeature};
 use crate::study::BaseScenario;
 use crate::study::fit::columns::FitError;
 pub use crate::study::fit::columns::{
@@ -92,7 +92,9 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     if let Some(tolerance) = request.tolerance {
         check_tolerance(tolerance).map_err(RelaxError::from)?;
     }
-    without_wind_or_followers(base.scenario(), "a fit")?;
+    if base.scenario().wind.is_some() {
+        return Err(RelaxError::from(UnmodelledFeature::Wind { what: "a fit" }).into());
+    }
     request.data.check_columns()?;
     request.data.check_choices()?;
     let coordinates = fit_coordinates(request)?;

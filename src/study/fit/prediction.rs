@@ -48,6 +48,11 @@ impl CaseSolution {
                 _ => None,
             });
         let count = frequencies.max().unwrap_or(0);
+        if count > 0 && at.levels.iter().any(|it| !it.leaf.leaf.has_potential()) {
+            return Err(ContinuationFailure::NotAtRest(
+                "its loads have no potential, without which it has no modes: leave out the frequencies".into(),
+            ));
+        }
         let mut modes = Vec::new();
         for level in at.levels.iter().filter(|_| count > 0) {
             let unknowns = 6 * level.leaf.rods() * level.leaf.segments();

@@ -56,8 +56,17 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::Joined => always("veins", "leaf.joined=false"),
         Key::Base => always("veins", "leaf.base=[[0.0,-0.1,0.0],[0.05,0.1,0.02]]"),
         Key::Elevation => smooth("blade", "leaf.elevation=0.42"),
-        Key::BaseHeld => always("pulled", "leaf.base_held=pinned"),
-        Key::BaseTurnStiffness => smooth("rooted", "leaf.base_turn_stiffness=1.9"),
+        Key::BaseHeld => [
+            always("pulled", "leaf.base_held=pinned"),
+            always("rooted", "leaf.base_held=['elastic','clamped']"),
+            always("mixed", "leaf.base_held=['elastic','clamped','elastic']"),
+        ]
+        .concat(),
+        Key::BaseTurnStiffness => [
+            smooth("rooted", "leaf.base_turn_stiffness=1.9"),
+            smooth("mixed", "leaf.base_turn_stiffness=1.9"),
+        ]
+        .concat(),
         Key::Torsion => smooth("veins", "stiffness.torsion=0.75"),
         Key::Bending2 => smooth("veins", "stiffness.bending_2=0.85"),
         Key::Bending3 => smooth("veins", "stiffness.bending_3=1.25"),
@@ -119,8 +128,8 @@ pub fn rows(key: Key) -> Vec<Row> {
         Key::Gravity => smooth("veins", "load.gravity[2]=-0.65"),
         Key::G => smooth("veins", "load.g[2]=-0.35"),
         Key::Distributed => always("veins", "load.distributed=[0.1,0.1,-0.3]"),
-        Key::Follower => always("following", "load.follower=[0.1,0.25,0.2]"),
-        Key::Couple => always("following", "load.couple=[0.1,0.15,0.1]"),
+        Key::Follower => smooth("following", "load.follower[1]=0.22"),
+        Key::Couple => smooth("following", "load.couple[1]=0.12"),
         Key::CoupleFollows => always("following", "load.couple_follows=true"),
         Key::PointFollows => always("following", "load.point[0].follows=false"),
         Key::TipForce => smooth("veins", "load.tip_force[1]=0.25"),
@@ -163,6 +172,12 @@ pub fn rows(key: Key) -> Vec<Row> {
                 Acts::Motions,
                 false,
             ),
+            row(
+                "following",
+                "load.factor={at=[0.0,0.2],factor=[1.0,3.0]}",
+                Acts::Motions,
+                false,
+            ),
         ],
         Key::PointFactor => vec![
             row(
@@ -173,6 +188,12 @@ pub fn rows(key: Key) -> Vec<Row> {
             ),
             row(
                 "twisted",
+                "load.point[0].factor={at=[0.0,0.1],factor=[1.0,9.0]}",
+                Acts::Motions,
+                false,
+            ),
+            row(
+                "following",
                 "load.point[0].factor={at=[0.0,0.1],factor=[1.0,9.0]}",
                 Acts::Motions,
                 false,
@@ -211,6 +232,12 @@ pub fn rows(key: Key) -> Vec<Row> {
             row(
                 "gripped",
                 "grip[0].move={at=[0.0,0.1],value=[[0.0,0.03,0.05],[0.0,0.03,-0.05]]}",
+                Acts::Motions,
+                false,
+            ),
+            row(
+                "rollers",
+                "grip[0].move={at=[0.0,0.1],value=[[0.0,0.03,0.05],[0.0,0.08,-0.05]]}",
                 Acts::Motions,
                 false,
             ),
@@ -260,10 +287,10 @@ pub fn rows(key: Key) -> Vec<Row> {
             "moving",
             "dynamics.base={at=[0.0,0.1],move=[[0.0,0.0,0.0],[0.0,0.1,0.1]],turn=[[0.0,0.0,0.0],[0.0,0.3,0.0]]}",
         ),
-        Key::WindVelocity => always("windy", "wind.velocity=[0.5,0.9,1.1]"),
-        Key::WindDensity => always("windy", "wind.density=1.3"),
-        Key::WindDrag => always("windy", "wind.drag=2.2"),
-        Key::WindWidth => always("windy", "wind.width=0.25"),
+        Key::WindVelocity => smooth("windy", "wind.velocity[1]=0.85"),
+        Key::WindDensity => smooth("windy", "wind.density=1.3"),
+        Key::WindDrag => smooth("windy", "wind.drag=2.2"),
+        Key::WindWidth => smooth("windy", "wind.width=0.22"),
         Key::PhotoScale => photographs("photographed", "photo.scale=0.0101"),
         Key::PhotoX => photographs("photographed", "photo.x=21.0"),
         Key::PhotoY => photographs("photographed", "photo.y=51.0"),
