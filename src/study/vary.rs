@@ -493,11 +493,19 @@ impl BaseScenario {
     /// # Errors
     /// If the scenario is then invalid, or has no such entry.
     pub fn with_value(&self, keys: &ParameterKeys, value: f64) -> Result<BaseScenario, VaryError> {
+        self.with_values(&[(keys, value)])
+    }
+
+    /// The base with these values substituted permanently.
+    ///
+    /// # Errors
+    /// If the scenario is then invalid, or has no such entry.
+    pub fn with_values(&self, values: &[(&ParameterKeys, f64)]) -> Result<BaseScenario, VaryError> {
         let VariedScenario {
             scenario,
             solver_settings: knobs,
-        } = self.scenario_with_values(&[(keys, value)])?;
-        let given = overrides_for_values(&[(keys, value)]);
+        } = self.scenario_with_values(values)?;
+        let given = overrides_for_values(values);
         Ok(BaseScenario {
             entries: self.entries.replaced(&given)?,
             overrides: [&self.overrides[..], &given].concat(),

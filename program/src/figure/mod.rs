@@ -14,6 +14,7 @@ pub(crate) mod motion;
 mod rod;
 pub(crate) mod scenario;
 mod sensitivity;
+mod sweep;
 mod trace;
 mod unbend;
 
@@ -26,6 +27,7 @@ pub use crate::figure::leaf::{draw as leaf, draw_equilibria as equilibria, draw_
 pub use crate::figure::map::draw as map;
 pub use crate::figure::motion::{draw_energies as energy, draw_filmstrip as filmstrip, write_film};
 pub use crate::figure::sensitivity::draw as sensitivity;
+pub use crate::figure::sweep::draw as sweep;
 pub use crate::figure::trace::draw as trace;
 pub use crate::figure::unbend::draw as unbend;
 use leafdyn::scenario::Scenario;
