@@ -591,7 +591,14 @@ impl BaseScenario {
                 }
                 Some(value) if found.is_none_or(|found| found == value) => found = Some(value),
                 Some(_) => return refuse("has another value than the keys it is joined to"),
-                None => return refuse("is a list or a profile: name one of its entries"),
+                None => {
+                    let value = self.entries.value_at(part);
+                    let entries = value.map(|value| part.number_paths(value));
+                    let example = entries.and_then(|all| all.first().copied());
+                    let example = example.map_or(String::new(), |one| format!(", as {one}"));
+                    let why = format!("is a list or a profile: name one of its entries{example}");
+                    return refuse(&why);
+                }
             }
         }
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))

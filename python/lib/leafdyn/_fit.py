@@ -5,20 +5,24 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ._arguments import texts
 from ._attribute import Attribute, computed
 from ._data import column_unit, column_variables, dataset, pandas
-from ._draw import axes, written
+from ._draw import stacked, written
 from ._leaf import Array
 from ._predict import Measurement, Prediction, draw, predicted, series
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
 from ._sweep import quantity
-from ._traced import draw_points
+from ._traced import POINTS, draw_points, draw_rows
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 
 @dataclass(frozen=True)
@@ -175,14 +179,15 @@ class Fit(Table):
         """The scenario with the values in place, as ``fitted.toml``."""
         return Scenario(self._files.contents("fitted.toml").decode())
 
-    def to_pandas(self, table: str = "data") -> Any:
+    def to_pandas(self, table: str = "data") -> DataFrame:
         """One of its tables as a ``pandas.DataFrame``.
 
         Parameters
         ----------
         table
             ``"data"``, a row a datum, as ``fit.csv``; ``"parameters"``, a row a free number: ``value``, ``low``,
-            ``high``, ``standard_error``, ``determined``, ``profiled``; or ``"correlations"``, a square.
+            ``high``, ``standard_error``, ``determined``, ``profiled``; or ``"correlations"`` or ``"covariance"``, a
+            square with the keys as rows and columns.
         """
         keys = list(self.parameters)
         if table == "data":
@@ -190,18 +195,20 @@ class Fit(Table):
         if table == "parameters":
             rows = [asdict(parameter) for parameter in self.parameters.values()]
             return pandas().DataFrame(rows).set_index("key")
-        if table == "correlations":
-            return pandas().DataFrame(self.correlations, keys, keys)
-        raise ValueError(f"table = {table!r}: must be data, parameters or correlations")
+        if table in ("correlations", "covariance"):
+            return pandas().DataFrame(getattr(self, table), keys, keys)
+        raise ValueError(f"table = {table!r}: must be data, parameters, correlations or covariance")
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An ``xarray.Dataset``: its table along ``datum``; the free numbers along ``parameter``, as ``value``, ``low``,
-        ``high``, ``standard_error`` and ``determined``, and ``correlations`` along ``parameter`` and ``other_parameter``."""
+        ``high``, ``standard_error`` and ``determined``, and ``correlations`` and ``covariance`` along ``parameter`` and
+        ``other_parameter``."""
         free = list(self.parameters.values())
         variables = column_variables(self.columns, ("datum",))
         for name in ("value", "low", "high", "standard_error", "determined"):
             variables[name] = (("parameter",), np.array([getattr(one, name) for one in free]), None)
-        variables["correlations"] = (("parameter", "other_parameter"), self.correlations, None)
+        for name in ("correlations", "covariance"):
+            variables[name] = (("parameter", "other_parameter"), getattr(self, name), None)
         keys = list(self.parameters)
         coordinates = {"parameter": keys, "other_parameter": keys}
         return dataset(variables, coordinates, self._units, self._attrs)
@@ -274,7 +281,8 @@ class Fit(Table):
         ax
             Where; left out: axes in a new figure.
         show
-            What was measured, as ``"tip_x"``; left out: what was measured most often.
+            What was measured, as ``"tip_x"``; left out: all that was measured, in axes of its own each, or in `ax` what
+            was measured most often.
         against
             The key that varied; left out: that with most values. Numbers that varied in step with it are interpolated;
             experiments that differ in others, too, have curves of their own.
@@ -282,46 +290,68 @@ class Fit(Table):
         Returns
         -------
         matplotlib Axes
+            Of several the first: ``ax.figure.axes`` has all.
 
         Raises
         ------
         ValueError
             If what is to be shown was not measured, or did not vary.
 
-        Where points on veins alone were measured, they are drawn over the fitted veins: in pixels as in their photograph,
-        else from the side, from above or from the front, whichever they show.
+        Points on veins are drawn over the fitted veins: in pixels as in their photograph, else from the side, from above
+        or from the front, whichever they show; where one coordinate alone was measured, over the fraction of the length.
+        What was measured without any number that varies, such as a single frequency, is drawn by its experiments.
         """
-        measured: dict[str, list[Measurement]] = {}
         said = self.to_dict()
         settings = {entry["experiment"]: entry["settings"] for entry in said["experiments"]}
+        points = [row for row in said["residuals"] if row["what"] in POINTS]
+        varied: dict[str, list[Measurement]] = {}
+        others: dict[str, list[Mapping[str, Any]]] = {}
         for row in said["residuals"]:
+            if row["what"] in POINTS:
+                continue
             if settings[row["experiment"]]:
-                measured.setdefault(row["what"], []).append((settings[row["experiment"]], row["data"], row["sd"]))
-        if not measured and show is None and against is None:
-            ax = axes(ax)
-            draw_points(ax, said["residuals"], self._units)
-            return self._titled(ax)
-        if not measured:
+                here = (settings[row["experiment"]], row["data"], row["sd"])
+                varied.setdefault(row["what"], []).append(here)
+            else:
+                others.setdefault(row["what"], []).append(row)
+        if not varied and (show is not None or against is not None) and show not in others:
             raise ValueError("show and against: no number of the scenario was varied in the experiments")
-        show = max(measured, key=lambda name: len(measured[name])) if show is None else show
-        if show not in measured:
-            raise ValueError(f"show = {show!r}: must be one of {', '.join(measured)}")
+        if show is not None:
+            if show not in varied and show not in others:
+                raise ValueError(f"show = {show!r}: must be one of {', '.join([*varied, *others])}")
+            panels: list[str | None] = [show]
+        else:
+            panels = [*varied, *(name for name in others if name not in varied), *([None] if points else [])]
+            if against is not None:
+                panels = [name for name in panels if name in varied]
+            if ax is not None:
+                often = sorted(varied, key=lambda name: -len(varied[name]))
+                panels = (often or panels)[:1]
+        every = [ax] if ax is not None else stacked(len(panels))
+        for here, name in zip(every, panels):
+            if name is None:
+                draw_points(here, points, self._units)
+            elif name in varied:
+                self._draw_varied(here, varied[name], name, against)
+            else:
+                draw_rows(here, others[name], name, self._units)
+            here.legend()
+        return self._titled(every[0])
+
+    def _draw_varied(self, ax: Any, measured: list[Measurement], show: str, against: str | None) -> None:
+        """Draw one result over a number that was varied."""
         varied: dict[str, set[float]] = {}
-        for here, _, _ in measured[show]:
+        for here, _, _ in measured:
             for key, value in here.items():
                 varied.setdefault(key, set()).add(value)
         against = max(varied, key=lambda key: len(varied[key])) if against is None else against
         if against not in varied:
             raise ValueError(f"against = {against!r}: must be one of {', '.join(varied)}")
-        ax = axes(ax)
-        groups = series(measured[show], against)
-        shown = [(group, self.predict(group.conditions, show)) for group in groups]
-        draw(ax, shown, (show, against), self._units)
-        return self._titled(ax)
+        groups = series(measured, against)
+        draw(ax, [(group, self.predict(group.conditions, show)) for group in groups], (show, against), self._units)
 
     def _titled(self, ax: Any) -> Any:
         ax.set_title("\n".join(self._interval(one) for one in self.parameters.values()), fontsize="small")
-        ax.legend()
         return ax
 
     def _interval(self, parameter: Parameter) -> str:
