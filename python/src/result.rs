@@ -470,6 +470,18 @@ impl Leaf {
         Ok(Some([numbers(|mode| mode.eigenvalue)?, errors]))
     }
 
+    /// Effective masses of the modes along the lab axes; none where shapes were not asked for.
+    fn effective_masses<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let modes = self.found.stability.modes.iter().flatten();
+        let masses: Option<Vec<[f64; 3]>> = modes.map(|mode| mode.effective_masses).collect();
+        let masses = masses.filter(|masses| !masses.is_empty());
+        let all = |masses: Vec<[f64; 3]>| {
+            let count = masses.len();
+            array(py, masses.as_flattened().to_vec(), &[count, 3])
+        };
+        masses.map(all).transpose()
+    }
+
     /// Displacements and rotations of the modes on the finest grid.
     fn mode_shapes<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 2]> {
         let modes = self.found.stability.modes.as_deref().unwrap_or_default();

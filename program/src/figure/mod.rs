@@ -324,6 +324,7 @@ mod tests {
         fan.stability.modes = Some(vec![Mode {
             eigenvalue: value,
             error: Some(1e-9),
+            effective_masses: None,
             displacement: shape.clone(),
             rotation: shape,
         }]);

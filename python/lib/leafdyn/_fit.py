@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _leafdyn
 from ._arguments import texts
 from ._attribute import Attribute, computed
 from ._data import column_unit, column_variables, dataset, pandas
 from ._draw import stacked, written
 from ._leaf import Array
 from ._predict import Measurement, Prediction, draw, predicted, series
+from ._progress import Heard
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
 from ._sweep import quantity
@@ -84,6 +86,66 @@ class Candidate:
     remark: str | None = None
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a fit was asked for."""
+
+    scenario: Scenario
+    tables: list[Any]
+    keys: list[str]
+    robust: bool
+    maps: list[str]
+    every: int
+    rows: list[str]
+    tolerance: float | None
+
+    def files(self, heard: Heard | None = None, candidates: Any = None) -> Contents:
+        """The fit, as the program writes it."""
+        core, chosen = self.scenario._core, (self.maps, self.every, self.rows)
+        return _leafdyn.fit(core, self.tables, self.keys, self.robust, candidates, *chosen, self.tolerance, heard)
+
+    def held(self, key: str, value: float, every: list[str]) -> Asked:
+        """The same with one of its free numbers held at a value."""
+        given = {text.partition("=")[0]: text for text in self.keys}
+        others = [given.get(name, name) for name in every if name != key]
+        if others and not key.startswith("offset:"):
+            return replace(self, scenario=Scenario(self.scenario, {key: value}), keys=others)
+        # It alone is free, or no number of the scenario: between bounds that are next to each other.
+        low, high = sorted((value * (1.0 - HELD), value * (1.0 + HELD))) if value else (-HELD, HELD)
+        return replace(self, keys=[*others, f"{key}={low!r}..{high!r}"])
+
+
+HELD = 1e-9
+"""Part of its value between which a number is held that cannot be set."""
+
+
+@dataclass(frozen=True, eq=False)
+class LikelihoodProfile:
+    """How well the data are met with one number held, and all others fitted anew.
+
+    Attributes
+    ----------
+    key
+        The number.
+    values
+        Its values, shape (K,).
+    chi_squared
+        The sum of the squares of residuals, in the standard deviations of the fit, shape (K,): at the minimum it is
+        least, and where it is 3.84 more the 95 % interval of a number with known standard deviations ends.
+    """
+
+    key: str
+    values: Array
+    chi_squared: Array
+
+    def to_pandas(self) -> DataFrame:
+        """A ``pandas.DataFrame`` with a row for each value."""
+        return pandas().DataFrame({self.key: self.values, "chi_squared": self.chi_squared})
+
+    def __repr__(self) -> str:
+        return f"<LikelihoodProfile of {self.key}: {len(self.values)} values>"
+
+
 TOLD = 4
 """Numbers that a fit shows."""
 
@@ -131,8 +193,9 @@ class Fit(Table):
     candidates = Attribute[list[Candidate]]("Experiments that could be made, the one that says most first.")
     wall_seconds = Attribute[float]("The time of it all.")
 
-    def __init__(self, files: Contents) -> None:
+    def __init__(self, files: Contents, asked: Asked | None = None) -> None:
         super().__init__(files)
+        self._asked = asked
         said = self.to_dict()
         self.name = said["scenario"]
         self.outcome = said["outcome"]
@@ -212,6 +275,60 @@ class Fit(Table):
         keys = list(self.parameters)
         coordinates = {"parameter": keys, "other_parameter": keys}
         return dataset(variables, coordinates, self._units, self._attrs)
+
+    def profile(self, key: str, values: Iterable[float] | None = None) -> LikelihoodProfile:
+        """How well the data are met with one free number held at each of some values, and all others fitted anew.
+
+        Parameters
+        ----------
+        key
+            One of `parameters`.
+        values
+            Left out: nine, over twice its 95 % interval.
+
+        Returns
+        -------
+        LikelihoodProfile
+            With ``values`` and ``chi_squared``.
+
+        Raises
+        ------
+        ValueError
+            If it is not free, its interval has no end and no values are given, or the fit was read from files.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> pull = {"load.tip_force[0]": [4, 8, 12, 16, 20], "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399]}
+        >>> known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
+        >>> found = leafdyn.fit("scenarios/measured/pull.toml", pull, "stiffness.axial", set=known)
+        >>> likelihood = found.profile("stiffness.axial")
+        >>> int(likelihood.chi_squared.argmin())
+        4
+        """
+        if key not in self.parameters:
+            raise ValueError(f"key = {key!r}: must be one of {', '.join(self.parameters)}")
+        if self._asked is None:
+            raise ValueError("the data are not in the files of a fit: fit again")
+        free = self.parameters[key]
+        if values is None:
+            if not (math.isfinite(free.low) and math.isfinite(free.high)):
+                raise ValueError(f"{key}: the data give its interval no end: give values")
+            if free.low > 0:
+                ratio = free.high / free.low
+                below, above = (np.geomspace(free.value, free.value * by, 5) for by in (1 / ratio, ratio))
+            else:
+                width = free.high - free.low
+                below, above = (np.linspace(free.value, free.value + by, 5) for by in (-width, width))
+            held = np.concatenate([below[:0:-1], above])
+        else:
+            held = np.array(list(values), dtype=np.float64)
+        sd = self.columns["sd"]
+        sums = []
+        for value in held:
+            columns = Fit(self._asked.held(key, float(value), list(self.parameters)).files()).columns
+            sums.append(float(np.sum(((columns["data"] - columns["model"]) / sd) ** 2)))
+        return LikelihoodProfile(key, held, np.array(sums))
 
     def predict(self, conditions: Source | Mapping[str, Any], what: str | Iterable[str] | None = None) -> Prediction:
         """What the fitted leaf does under other conditions, with 95 % bands.

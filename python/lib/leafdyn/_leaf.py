@@ -286,6 +286,13 @@ class Equilibrium(Viewed):
             return np.sqrt(self.eigenvalues)
 
     @computed
+    def effective_masses(self) -> Array | None:
+        """How much of the leaf's mass a base that is shaken along an axis moves in each mode, shape (modes, 3), along x, y
+        and z, in units of mass, on the finest grid: see `leafdyn.modes`; none of leaves whose modes' shapes were not
+        asked for. Those of all modes sum up to the mass of the leaf."""
+        return self._core.effective_masses()
+
+    @computed
     def _mode_shapes(self) -> tuple[Array, Array]:
         return self._core.mode_shapes()
 
@@ -373,6 +380,7 @@ class Equilibrium(Viewed):
             "eigenvalues": (modes, self.eigenvalues, (0, 0, -2)),
             "eigenvalue_errors": (modes, self.eigenvalue_errors, (0, 0, -2)),
             "frequencies": (modes, self.frequencies, (0, 0, -1)),
+            "effective_masses": ((*modes, "component"), getattr(self, "effective_masses", None), (-1, 1, 2)),
             "mode_displacements": ((*modes, *line, "component"), shapes[0] if some else None, None),
             "mode_rotations": ((*modes, *line, "component"), shapes[1] if some else None, None),
         }
@@ -537,6 +545,7 @@ _LATER = (
     "_base_errors",
     "_reaction_errors",
     "_modes",
+    "effective_masses",
     "_mode_shapes",
     "sensitivities",
 )

@@ -592,6 +592,7 @@ mod tests {
         let mode = |eigenvalue, error| Mode {
             eigenvalue,
             error: Some(error),
+            effective_masses: None,
             displacement: Vec::new(),
             rotation: Vec::new(),
         };
