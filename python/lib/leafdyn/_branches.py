@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 def _points(
     columns: dict[str, NDArray[Any]], lines: list[Array], units: Mapping[str, str], value: str = "value"
-) -> Any:
+) -> Dataset:
     """Columns and centerlines of points as a data set."""
     variables = column_variables(columns, ("point",), value)
     least = min((line.shape[1] - 1 for line in lines), default=0)

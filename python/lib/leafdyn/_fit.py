@@ -443,7 +443,7 @@ class Fit(Table):
                 panels = [name for name in panels if name in varied]
             if ax is not None:
                 often = sorted(varied, key=lambda name: -len(varied[name]))
-                panels = (often or panels)[:1]
+                panels = [*often, *panels][:1]
         every = [ax] if ax is not None else stacked(len(panels))
         for here, name in zip(every, panels):
             if name is None:

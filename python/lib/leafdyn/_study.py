@@ -101,12 +101,12 @@ class Equilibria(Viewed, Sequence[Equilibrium]):
         leaves = [leaf.to_xarray() for leaf in self]
         if not leaves:
             return dataset({}, {}, self._units, self._attrs)
-        found = xarray().concat(
+        found: Any = xarray().concat(
             leaves, "equilibrium", data_vars="all", coords="minimal", compat="override", join="outer"
         )
-        return found.assign_coords(equilibrium=range(len(leaves))).assign(
-            starts=("equilibrium", self.starts), plain=("equilibrium", self.plain)
-        )
+        starts = {"starts": ("equilibrium", self.starts), "plain": ("equilibrium", self.plain)}
+        whole: Dataset = found.assign_coords(equilibrium=range(len(leaves))).assign(starts)
+        return whole
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw all of them with matplotlib, each in a colour: solid if it is stable, dashed if not; with their energies

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import product
 from math import nan
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex, TypeAlias, Union
 
 import numpy as np
 
@@ -35,13 +35,16 @@ AT_ONCE = 2000
 AT_ONCE_WITH_MODES = 200
 """Leaves that are kept where they have shapes of modes."""
 
-Keys = str | tuple[str, ...]
+Values: TypeAlias = Union[Range, Iterable[Any]]
+"""What a key takes one after the other."""
+
+Keys: TypeAlias = Union[str, tuple[str, ...]]
 """A key, or several that take the same value: joined by ``+``, or in a tuple."""
 
 
 def sweep(
     scenario: Source,
-    vary: str | Iterable[str] | Mapping[Keys, Range | Iterable[Any]],
+    vary: str | Iterable[str] | Mapping[str, Values] | Mapping[tuple[str, ...], Values] | Mapping[Keys, Values],
     columns: str | Iterable[str] | Mapping[str, Of] = COLUMNS,
     *,
     errors: bool = True,
@@ -139,8 +142,8 @@ def sweep(
     )
     told = tells_refusals(on_error)
     base = checked(scenario, set)
-    vary = vary if isinstance(vary, Mapping) else dict(spans(vary))
-    named = {_joined(keys): span for keys, span in vary.items()}
+    given: Mapping[Any, Any] = vary if isinstance(vary, Mapping) else spans(vary)
+    named = {_joined(keys): span for keys, span in given.items()}
     axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in named.items()}
     grid = list(product(*axes.values()))
     leaves = [_at(base, dict(zip(axes, point)), told) for point in grid]
