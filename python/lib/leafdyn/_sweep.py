@@ -44,7 +44,7 @@ Keys: TypeAlias = Union[str, tuple[str, ...]]
 
 def sweep(
     scenario: Source,
-    vary: str | Iterable[str] | Mapping[str, Values] | Mapping[tuple[str, ...], Values] | Mapping[Keys, Values],
+    vary: str | Iterable[str] | Mapping[str, Values] | Mapping[Any, Values],
     columns: str | Iterable[str] | Mapping[str, Of] = COLUMNS,
     *,
     errors: bool = True,
