@@ -184,7 +184,7 @@ fn a_fixed_grid_may_vary() {
     let exact = exact["tip"][2].number();
     let orders = [0, 1].map(|k| {
         let [fine, coarse] = [tips[k + 1] - exact, tips[k] - exact].map(f64::abs);
-        (coarse / fine).ln() / ([20.0, 32.0][k] / [8.0, 20.0][k] as f64).ln()
+        (coarse / fine).ln() / (f64::from([20, 32][k]) / f64::from([8, 20][k])).ln()
     });
     assert!(
         orders.iter().all(|order| (order - 2.0).abs() < 0.1),
