@@ -99,9 +99,7 @@ def test_errors_stand_beside_numbers() -> None:
     # df = dw^2 / (8 pi^2 f) to first order.
     first_order = leaf.eigenvalue_errors[0] / (8 * np.pi**2 * leaf.frequencies[0])
     assert table["frequency_1_error"][1] == pytest.approx(first_order, rel=1e-6)
-    assert table["tip_z_error"][1] == pytest.approx(leafdyn.relax(
-        fan(3), tolerance=1e-8, set={"load.gravity[2]": -2.0}
-    ).error_estimate)
+    assert table["tip_z_error"][1] == leaf.error_estimate
     alone = leafdyn.sweep(fan(3), {"load.gravity[2]": [-1.0]}, "tip_z_error")
     assert alone.columns.tolist() == ["load.gravity[2]", "tip_z_error"]
 

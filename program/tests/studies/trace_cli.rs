@@ -296,7 +296,7 @@ fn a_branch_that_is_lost_says_how_the_leaf_buckles() {
         place.write("column.toml", column);
         let run = place.ok("trace column.toml --vary load.tip_force[0]=-1..-4 --write none");
         run.says(&[
-            "branches cross at -2.4674011",
+            "branches cross at -2.467401",
             &format!("index 0 to 1: {how}"),
         ]);
     }
