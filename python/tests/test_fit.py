@@ -191,13 +191,14 @@ def test_a_profile_is_a_parabola_near_the_minimum() -> None:
         "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399],
         "sd_tip_x": 0.0005,
     }
-    known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
-    for free in (["stiffness.axial"], ["stiffness.axial", "stiffness.bending_2"]):
-        fit = leafdyn.fit("scenarios/measured/pull.toml", pull, free, set=known)
+    shear = {key: REST[key] for key in ("stiffness.shear_2", "stiffness.shear_3")}
+    for free, known in (([AXIAL], REST), ([AXIAL, "stiffness.bending_2"], shear)):
+        fit = leafdyn.fit(PULL, pull, free, set=known)
         axial = fit.parameters["stiffness.axial"]
         found = fit.profile("stiffness.axial", [axial.low, axial.value, axial.high])
         assert found.chi_squared[1] == pytest.approx(fit.chi_squared, rel=1e-4)
-        assert found.chi_squared[[0, 2]] - found.chi_squared[1] == pytest.approx([1.96**2] * 2, rel=0.05)
+        # The cubic term of either end has the opposite sign at the other.
+        assert found.chi_squared[[0, 2]].mean() - found.chi_squared[1] == pytest.approx(1.96**2, rel=0.02)
     with pytest.raises(ValueError, match="key = 'leaf.length': must be one of stiffness.axial"):
         fit.profile("leaf.length")
     square = fit.to_pandas("covariance")

@@ -111,8 +111,11 @@ class Asked:
         if others and not key.startswith("offset:"):
             return replace(self, scenario=Scenario(self.scenario, {key: value}), keys=others)
         # It alone is free, or no number of the scenario: between bounds that are next to each other.
-        low, high = sorted((value * (1.0 - HELD), value * (1.0 + HELD))) if value else (-HELD, HELD)
-        return replace(self, keys=[*others, f"{key}={low!r}..{high!r}"])
+        scenario = self.scenario if key.startswith("offset:") else Scenario(self.scenario, {key: value})
+        # What was scaled already has the factor one.
+        here = 1.0 if key.startswith("scale:") else value
+        low, high = sorted((here * (1.0 - HELD), here * (1.0 + HELD))) if here else (-HELD, HELD)
+        return replace(self, scenario=scenario, keys=[*others, f"{key}={low!r}..{high!r}"])
 
 
 HELD = 1e-9

@@ -173,7 +173,12 @@ def _joined(keys: Keys) -> str:
 
 def _at(base: Scenario, point: Mapping[str, Any], told: bool) -> Scenario | RefusedLeaf:
     """The scenario with these values, or why it is refused."""
-    entries = {key: value for keys, value in point.items() for key in keys.split("+")}
+    entries: dict[str, Any] = {}
+    for keys, value in point.items():
+        for key in keys.split("+"):
+            # A whole table has its entries replaced.
+            is_table = isinstance(value, Mapping) and "." not in key
+            entries |= {f"{key}.{name}": part for name, part in value.items()} if is_table else {key: value}
     try:
         return Scenario(base, entries)
     except ValueError as refused:
