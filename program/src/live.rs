@@ -74,7 +74,7 @@ mod tests {
 
     #[test]
     fn a_scenario_stands_in_the_page_as_data() {
-        let page = page("name = \"</script>\"", "a.toml", &[]).unwrap();
+        let page = live_page("name = \"</script>\"", "a.toml", &[]).unwrap();
         assert!(page.contains("name = \\\"\\u003c/script>"));
         assert_eq!(page.matches("id=\"given\"").count(), 1);
     }

@@ -44,7 +44,7 @@ mod _leafdyn {
     #[pymodule_export]
     use super::relax::{library_seconds, relax_many, relax_one};
     #[pymodule_export]
-    use super::result::{Files, Leaf, kind};
+    use super::result::{Files, Leaf, kind, leaf_column};
     #[pymodule_export]
     use super::run::{panic_on_purpose, set_threads, threads};
     #[pymodule_export]

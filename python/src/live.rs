@@ -2,10 +2,15 @@
 
 use leafdyn::study::ParameterKeys;
 use leafdyn_program::live::{self, LiveSlider};
+use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use crate::errors::{value_error, vary_error};
+use crate::errors::vary_error;
 use crate::scenario::Scenario;
+
+/// What is told where the package was built without the page.
+const HOW_TO_BUILD: &str = "this package was built without the live page: in the checkout, \
+    `web/build.sh && MATURIN_PEP517_ARGS=\"--features live\" pip install ./python` builds it with the page";
 
 /// The page on which a scenario is open, with these sliders: the path of a number, the ends of its
 /// range, and whether it is logarithmic.
@@ -35,5 +40,5 @@ pub fn live_page(
         false => base.toml(&[]).unwrap_or_default(),
     };
     let name = format!("{}.toml", base.scenario().name);
-    live::live_page(&text, &name, &sliders).map_err(value_error)
+    live::live_page(&text, &name, &sliders).map_err(|_| PyValueError::new_err(HOW_TO_BUILD))
 }

@@ -140,14 +140,22 @@ impl Asked {
     }
 }
 
-/// Reports every step of a relaxation to a monitor.
+/// Reports every step of a relaxation to a monitor, counted over all grids.
 pub fn reporter<'a>(monitor: &'a Monitor, name: &'a str) -> impl FnMut(&Progress) + 'a {
+    let (mut before, mut last) = (0, 0);
     move |progress| {
         let (Progress::Relaxing { step, .. }
         | Progress::Shooting(CorrectionProgress {
             iteration: step, ..
         })) = progress;
-        monitor.report(*step as f64, None, || format!("{name}: {progress}"));
+        if *step < last {
+            // The next grid counts from the beginning.
+            before += last + 1;
+        }
+        last = *step;
+        monitor.report((before + step) as f64, None, || {
+            format!("{name}: {progress}")
+        });
     }
 }
 

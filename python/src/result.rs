@@ -7,7 +7,9 @@ use std::sync::{Arc, OnceLock};
 use leafdyn::relax::{
     BaseReaction, Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses,
 };
+use leafdyn::scenario::units::Dimension;
 use leafdyn::scenario::{Scenario, Stress};
+use leafdyn::study::{ColumnKind, ColumnValue, LeafColumn};
 use leafdyn::surface::{AngleDistribution, TriangleMesh};
 use leafdyn_program::files::{self, FileError, FileKind, ResultDocument, WrittenResult};
 use pyo3::exceptions::{PyKeyError, PyOSError, PyValueError};
@@ -16,6 +18,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::arrays::{Array, ForceAndMoment, array, curves, flat, nodes, vectors};
+use crate::errors::value_error;
 use crate::run::on_pool;
 
 /// Any result that can be written to files.
@@ -83,6 +86,42 @@ fn read<'py>(
 #[pyfunction]
 pub fn kind(file: &str) -> &'static str {
     FileKind::from_file_name(file).word()
+}
+
+/// What a column of a table of leaves is: the kind of its cells, the exponents of length, force and time in its
+/// unit, how many modes it needs, and whether its numbers have bounds on their errors.
+#[pyfunction]
+pub fn leaf_column(name: &str) -> PyResult<(&'static str, Dimension, usize, bool)> {
+    let column: LeafColumn = name.parse().map_err(value_error)?;
+    let kind = match column.kind() {
+        ColumnKind::Number => "number",
+        ColumnKind::Count => "count",
+        ColumnKind::Truth => "truth",
+        ColumnKind::Text => "text",
+    };
+    let quantity = column.quantity;
+    let has_error = quantity.has_error() && !column.is_error;
+    Ok((kind, quantity.dimension(), quantity.modes(), has_error))
+}
+
+/// A cell of a table of leaves.
+#[derive(IntoPyObject)]
+pub enum Cell {
+    Number(f64),
+    Count(usize),
+    Truth(bool),
+    Text(String),
+}
+
+impl From<ColumnValue> for Cell {
+    fn from(value: ColumnValue) -> Self {
+        match value {
+            ColumnValue::Number(value) => Cell::Number(value),
+            ColumnValue::Count(count) => Cell::Count(count),
+            ColumnValue::Truth(is_true) => Cell::Truth(is_true),
+            ColumnValue::Text(text) => Cell::Text(text),
+        }
+    }
 }
 
 /// The files of a result.
@@ -196,6 +235,12 @@ impl Leaf {
     #[getter]
     fn error_estimate(&self, py: Python) -> Option<f64> {
         self.shown(py).accuracy.error_estimate
+    }
+
+    /// Its cell in a column of a table of leaves; none where that is not known.
+    fn column(&self, py: Python, name: &str) -> PyResult<Option<Cell>> {
+        let column: LeafColumn = name.parse().map_err(value_error)?;
+        Ok(column.value(self.shown(py)).map(Cell::from))
     }
 
     /// The surface, with the veins as tubes or as a body of its thickness: vertices, normals, places along and
@@ -423,6 +468,18 @@ impl Leaf {
         };
         let errors = numbers(|mode| mode.error.unwrap_or(f64::INFINITY))?;
         Ok(Some([numbers(|mode| mode.eigenvalue)?, errors]))
+    }
+
+    /// Effective masses of the modes along the lab axes; none where shapes were not asked for.
+    fn effective_masses<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyAny>>> {
+        let modes = self.found.stability.modes.iter().flatten();
+        let masses: Option<Vec<[f64; 3]>> = modes.map(|mode| mode.effective_masses).collect();
+        let masses = masses.filter(|masses| !masses.is_empty());
+        let all = |masses: Vec<[f64; 3]>| {
+            let count = masses.len();
+            array(py, masses.as_flattened().to_vec(), &[count, 3])
+        };
+        masses.map(all).transpose()
     }
 
     /// Displacements and rotations of the modes on the finest grid.

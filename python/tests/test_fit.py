@@ -181,3 +181,25 @@ def test_columns_of_a_machine(tmp_path: Path) -> None:
         leafdyn.fit(PULL, plain, AXIAL, every=0)
     with pytest.raises(TypeError, match="columns: must be a dict of texts"):
         leafdyn.fit(PULL, plain, AXIAL, columns=["Force"])  # type: ignore[arg-type]
+
+
+def test_a_profile_is_a_parabola_near_the_minimum() -> None:
+    """Of one number with known standard deviations chi squared grows by the square of its distance in standard errors,
+    and by 3.84 to the ends of its interval; with a second free number that is fitted anew, too."""
+    pull = {
+        "load.tip_force[0]": [4, 8, 12, 16, 20],
+        "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399],
+        "sd_tip_x": 0.0005,
+    }
+    shear = {key: REST[key] for key in ("stiffness.shear_2", "stiffness.shear_3")}
+    for free, known in (([AXIAL], REST), ([AXIAL, "stiffness.bending_2"], shear)):
+        fit = leafdyn.fit(PULL, pull, free, set=known)
+        axial = fit.parameters["stiffness.axial"]
+        found = fit.profile("stiffness.axial", [axial.low, axial.value, axial.high])
+        assert found.chi_squared[1] == pytest.approx(fit.chi_squared, rel=1e-4)
+        # The cubic term of either end has the opposite sign at the other.
+        assert found.chi_squared[[0, 2]].mean() - found.chi_squared[1] == pytest.approx(1.96**2, rel=0.02)
+    with pytest.raises(ValueError, match="key = 'leaf.length': must be one of stiffness.axial"):
+        fit.profile("leaf.length")
+    square = fit.to_pandas("covariance")
+    assert square.loc["stiffness.axial", "stiffness.bending_2"] == fit.covariance[0, 1]

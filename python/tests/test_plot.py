@@ -184,3 +184,54 @@ def test_a_narrow_leaf_has_few_ticks_across() -> None:
     low, high = ax.get_ylim()
     assert sum(low <= tick <= high for tick in ax.get_yticks()) <= 2 < len(ax.get_zticks())
     assert ax.get_zlabel() == "z / cm"
+
+
+def test_a_rod_in_a_plane_is_drawn_in_it() -> None:
+    """A rod bent sideways from above, one bent down from the side, one in space in space."""
+    for force, names in [([0, 0.3, 0], ("x", "y")), ([0, 0, -0.3], ("x", "z")), ([0, 0.3, -0.3], ("x", "y", "z"))]:
+        rod = {**column(), "load": {"tip_force": force}}
+        leaf = leafdyn.relax(rod)
+        ax = leaf.plot()
+        assert hasattr(ax, "get_zlim") == (len(names) == 3)
+        assert (ax.get_xlabel(), ax.get_ylabel()) == names[:2]
+        if len(names) == 2:
+            drawn = ax.lines[0].get_xydata()
+            assert drawn[-1] == pytest.approx(leaf.tip[["xyz".index(name) for name in names]])
+            # Another one on the same axes is drawn in the same plane.
+            leafdyn.relax(rod, set={"load.tip_force": [0.5 * x for x in force]}).plot(ax=ax)
+            assert abs(ax.lines[1].get_xydata()[-1, 1]) > 1e-3
+
+
+def test_a_fit_draws_all_that_was_measured() -> None:
+    """Every result in axes of its own, and points of which one coordinate alone was measured."""
+    pulled = leafdyn.Scenario("scenarios/measured/pull.toml", set={"stiffness.shear_2": 40, "stiffness.shear_3": 50})
+    forces = [4.0, 8.0, 12.0, 16.0]
+    tips = [leafdyn.relax(pulled, set={"load.tip_force[0]": force}).tips[0] for force in forces]
+    pull: dict[str, Any] = {"load.tip_force[0]": forces, "sd_tip_x": 5e-4, "sd_tip_y": 5e-4}
+    pull |= {f"tip_{axis}": [tip["xy".index(axis)] for tip in tips] for axis in "xy"}
+    fit = leafdyn.fit(pulled, pull, "stiffness.axial")
+    ax = fit.plot()
+    assert sorted(one.get_ylabel() for one in ax.figure.axes) == ["tip x", "tip y"]
+    rod = {**column(), "load": {"tip_force": [0.0, 0.0, -0.5]}}
+    leaf = leafdyn.relax(rod)
+    points = {"sigma": leaf.stations[4::4], "z": leaf.positions[0, 4::4, 2], "sd": 1e-3}
+    ax = leafdyn.fit(rod, points, "stiffness.bending_2").plot()
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("fraction of the length", "z")
+    assert ax.lines[0].get_ydata() == pytest.approx(points["z"])
+    assert ax.lines[1].get_ydata() == pytest.approx(points["z"], abs=1e-4)
+
+
+def test_maps_and_charts_are_drawn() -> None:
+    found = leafdyn.stability_map(fan(2), {"load.gravity[2]": (-1, -2, 2)}, methods=["semi-implicit", "shooting"])
+    ax = found.plot()
+    assert [text.get_text() for text in ax.get_yticklabels()] == ["semi-implicit", "shooting"]
+    assert ax.get_xlabel() == "load.gravity[2]"
+    both = {"load.gravity[2]": (-1, -2, 2), "stiffness.bending_2": (1, 2, 2)}
+    ax = leafdyn.stability_map(fan(2), both, methods=["semi-implicit"]).plot()
+    assert sum(len(line.get_xdata()) for line in ax.lines) == 4
+    with pytest.raises(ValueError, match="method = 'explicit': must be one of semi-implicit"):
+        leafdyn.stability_map(fan(2), both, methods=["semi-implicit"]).plot(method="explicit")
+    chart = leafdyn.chart(fan(2), seconds=0.05, methods=["semi-implicit"])
+    ax = chart.plot()
+    assert (ax.get_xscale(), ax.get_yscale()) == ("log", "log")
+    assert [line.get_label() for line in ax.lines] == ["semi-implicit"]

@@ -349,3 +349,35 @@ def test_a_blade_has_as_many_veins_as_it_needs() -> None:
             leafdyn.relax(blade, veins=wrong)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="goes with neither margin nor start"):
         leafdyn.relax(blade, veins="auto", margin=True)
+
+
+def test_leaves_are_equal_where_all_numbers_are() -> None:
+    one, same, other = (leafdyn.relax(fan(2), set={"load.gravity[2]": -weight}) for weight in (1.0, 1.0, 1.0 + 1e-15))
+    assert one == same and hash(one) == hash(same)
+    assert one != other and one != "leaf"
+    assert pickle.loads(pickle.dumps(one)) == one
+
+
+def test_a_blade_tells_both_of_its_errors() -> None:
+    blade = leafdyn.relax(leafdyn.new("blade"), veins_error=True)
+    assert re.search(r"within \S+ by its grid, about \S+ by its number of veins>$", repr(blade)), repr(blade)
+    assert "veins" not in repr(leafdyn.relax(leafdyn.new("blade")))
+
+
+def test_effective_masses_are_those_of_a_cantilever() -> None:
+    """0.6131 and 0.1883 of its mass, as the mode shapes of a slender clamped rod integrate to; across all modes no more
+    than the mass."""
+    rod = {
+        **column(),
+        "stiffness": {**column()["stiffness"], "torsion": 1e3, "bending_3": 1.0, "bending_2": 1e4},
+        "dynamics": {"density": 2.0},
+    }
+    leaf = leafdyn.modes(rod, 3, tolerance=1e-6)
+    masses = leaf.effective_masses
+    assert masses is not None and masses.shape == (3, 3)
+    assert masses[:2, 1] == pytest.approx([2.0 * 0.6131, 2.0 * 0.1883], rel=2e-3)
+    assert masses[:, [0, 2]] == pytest.approx(0.0, abs=1e-9)
+    assert masses[:, 1].sum() < 2.0
+    assert leafdyn.relax(rod, modes=3).effective_masses is None
+    assert leaf.to_dict()["effective_masses"] == masses.tolist()
+    assert np.array_equal(pickle.loads(pickle.dumps(leaf)).effective_masses, masses)

@@ -20,8 +20,10 @@ GRID: dict[str, Any] = {"leaf.rods": [2, 3], "load.gravity[2]": np.array([-1.0, 
 
 
 def test_a_grid_row_by_row() -> None:
-    table = leafdyn.sweep(fan(2), GRID, set={"units.length": "cm", "units.force": "N"})
-    assert table.columns.tolist() == [*GRID, *WANTED]
+    units = {"units.length": "cm", "units.force": "N"}
+    table = leafdyn.sweep(fan(2), GRID, set=units)
+    assert [name for name in table.columns if not name.endswith("_error")] == [*GRID, *WANTED]
+    assert leafdyn.sweep(fan(2), GRID, errors=False).columns.tolist() == [*GRID, *WANTED]
     assert table["leaf.rods"].tolist() == [2, 2, 2, 3, 3, 3]
     for _, row in table.iterrows():
         leaf = leafdyn.relax(fan(2), set={key: row[key] for key in GRID})
@@ -31,14 +33,17 @@ def test_a_grid_row_by_row() -> None:
             assert row[name] == getattr(leaf, name)
     assert table.attrs["scenario"] == "fan"
     lengths = dict.fromkeys(("tip_x", "tip_y", "tip_z", "error_estimate"), "cm")
-    assert table.attrs["units"] == {"load.gravity[2]": "N cm^-1", **lengths, "energy": "N cm"}
+    errors = dict.fromkeys(("tip_x_error", "tip_y_error", "tip_z_error"), "cm")
+    energies = {"energy": "N cm", "energy_error": "N cm"}
+    assert table.attrs["units"] == {"load.gravity[2]": "N cm^-1", **lengths, **errors, **energies}
 
 
 def test_every_column() -> None:
     names = "reaction_x lowest_eigenvalue frequency_2 path success neutral_directions wall_seconds remark".split()
     held = {"tip.held": "pinned", "tip.position": [0.9, 0.3, 0.1]}
     table = leafdyn.sweep(fan(3), {"load.gravity[2]": (-1, -2, 2)}, names, set=held)
-    leaf = leafdyn.relax(fan(3), modes=2, set={**held, "load.gravity[2]": -2})
+    # Frequencies are as accurate as those of modes.
+    leaf = leafdyn.modes(fan(3), 2, set={**held, "load.gravity[2]": -2})
     assert leaf.eigenvalues is not None and leaf.frequencies is not None and leaf.tip_reaction is not None
     last = table.iloc[-1]
     assert last["reaction_x"] == leaf.tip_reaction[0]
@@ -72,7 +77,49 @@ def test_keys_that_go_together_and_ranges() -> None:
 def test_frequencies_have_units() -> None:
     names = ["frequency_1", "lowest_eigenvalue"]
     table = leafdyn.sweep(leafdyn.new("blade"), {"leaf.rods": [3]}, names)
-    assert table.attrs["units"] == {"frequency_1": "Hz", "lowest_eigenvalue": "s^-2"}
+    units = {"frequency_1": "Hz", "lowest_eigenvalue": "s^-2"}
+    assert table.attrs["units"] == units | {f"{name}_error": unit for name, unit in units.items()}
+
+
+def test_errors_stand_beside_numbers() -> None:
+    """They are those of the leaf, bound what is known in closed form, and frequencies keep the tolerance."""
+    names = ["frequency_1", "base_reaction_z", "tip_z", "stable"]
+    table = leafdyn.sweep(fan(3), {"load.gravity[2]": [-1.0, -2.0]}, names, tolerance=1e-8)
+    assert table.columns.tolist() == [
+        *("load.gravity[2]", "frequency_1", "frequency_1_error", "base_reaction_z", "base_reaction_z_error"),
+        *("tip_z", "tip_z_error", "stable"),
+    ]
+    # The base carries the weight of three rods of length one.
+    away = (table["base_reaction_z"] - 3 * table["load.gravity[2]"]).abs()
+    assert (away <= table["base_reaction_z_error"] + 1e-14).all()
+    assert (table["frequency_1_error"] <= 1e-8 * table["frequency_1"]).all()
+    leaf = leafdyn.modes(fan(3), 1, tolerance=1e-8, set={"load.gravity[2]": -2.0})
+    assert leaf.eigenvalues is not None and leaf.eigenvalue_errors is not None and leaf.frequencies is not None
+    assert table["frequency_1"][1] == leaf.frequencies[0]
+    # df = dw^2 / (8 pi^2 f) to first order.
+    first_order = leaf.eigenvalue_errors[0] / (8 * np.pi**2 * leaf.frequencies[0])
+    assert table["frequency_1_error"][1] == pytest.approx(first_order, rel=1e-6)
+    assert table["tip_z_error"][1] == leaf.error_estimate
+    alone = leafdyn.sweep(fan(3), {"load.gravity[2]": [-1.0]}, "tip_z_error")
+    assert alone.columns.tolist() == ["load.gravity[2]", "tip_z_error"]
+
+
+def test_keys_in_a_tuple_and_whole_tables() -> None:
+    joined = leafdyn.sweep(fan(3), {"coupling.y+coupling.z": [0.5, 2.0]}, "tip_z")
+    tupled = leafdyn.sweep(fan(3), {("coupling.y", "coupling.z"): [0.5, 2.0]}, "tip_z")
+    assert tupled.equals(joined)
+    rod = {
+        "name": "rod",
+        "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
+        "section": {"shape": "circle", "diameter": 0.1, "young": 1e5},
+        "load": {"gravity": [0, 0, -0.1]},
+    }
+    sections = [{"shape": "circle", "diameter": d, "young": 1e5} for d in (0.1, 0.2)]
+    table = leafdyn.sweep(rod, {"section": sections}, ["tip_z", "peak_stress"])
+    alone = leafdyn.sweep(rod, {"section.diameter": [0.1, 0.2]}, ["tip_z", "peak_stress"])
+    assert table["tip_z"].tolist() == alone["tip_z"].tolist()
+    assert table["section"].tolist() == sections
+    assert table["peak_stress"].tolist() == alone["peak_stress"].tolist()
 
 
 def test_leaves_that_do_not_come_to_rest_are_counted() -> None:

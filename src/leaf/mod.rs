@@ -9,6 +9,7 @@
 
 mod assembly;
 mod block_tridiagonal;
+mod buckling;
 mod derivative;
 mod direct;
 mod discrete;
@@ -30,6 +31,7 @@ mod system;
 mod tissue;
 
 pub use crate::leaf::assembly::SegmentTangent;
+pub use crate::leaf::buckling::{BucklingMode, BucklingMotion};
 pub use crate::leaf::derivative::parameter::{
     DenseParameterForces, LeafParameterDerivative, LinearResponse, ParameterForces, Weighted,
     hessian_at_constant_force,

@@ -587,6 +587,25 @@ pub fn mass(leaf: &DiscreteLeaf, physics: &Physics, state: &State, shape: &[Incr
     leaf.rod_index_pairs(leaf.moving_nodes()).map(node).sum()
 }
 
+/// The effective masses of a shape along the lab axes: p^2/m, where m is its mass and p the momentum of the leaf if it
+/// moves at the rate of the shape. A base that is shaken along an axis excites a mode with this mass; those of all
+/// modes sum up to the mass of the leaf (Clough and Penzien, Dynamics of Structures, 3rd ed., section 12-5).
+pub fn effective_masses(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    shape: &[Increment],
+) -> [f64; 3] {
+    let node = |(j, i)| {
+        let k = state.base(j) + i;
+        let rates = [rotation_part(&shape[k]), displacement_part(&shape[k])];
+        physics.inertia(leaf, j, i).momentum(state.q[k], rates)[1]
+    };
+    let momentum: DVec3 = leaf.rod_index_pairs(leaf.moving_nodes()).map(node).sum();
+    let mass = mass(leaf, physics, state, shape);
+    (momentum * momentum / mass).to_array()
+}
+
 /// Rounding error of the quotient of a mode of unit mass.
 pub fn quotient_rounding(leaf: &DiscreteLeaf) -> f64 {
     let sections = leaf.sections.iter();

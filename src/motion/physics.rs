@@ -436,6 +436,11 @@ impl Physics {
         self.dynamics.clamped
     }
 
+    /// The unit of masses, in that of the scenario.
+    pub fn mass_unit(&self) -> f64 {
+        self.density_unit * self.scale.length
+    }
+
     /// Inertia of node `i` of rod `j`.
     pub fn inertia(&self, leaf: &DiscreteLeaf, j: usize, i: usize) -> Inertia {
         let sigma = leaf.grid.sigma()[i];

@@ -216,9 +216,13 @@ pub fn lowest(
         .position(|segments| Some(*segments) == on))
     .map_or(1.0, |grid| nested.series.bifurcation_error_factor(grid));
     let NestedEigenvalues { series, finest, .. } = nested;
-    let shapes = match options.mode_shapes {
-        true => finest?.shapes(&found.levels.last()?.leaf),
-        false => Vec::new(),
+    let finest = finest?;
+    let (shapes, masses) = match options.mode_shapes {
+        true => (
+            finest.shapes(&found.levels.last()?.leaf),
+            finest.effective_masses(&physics),
+        ),
+        false => Default::default(),
     };
     let unit = physics.time_unit.powi(-2);
     let mode = |it: ExtrapolatedEigenvalue| {
@@ -226,6 +230,7 @@ pub fn lowest(
         Mode {
             eigenvalue: it.value * unit,
             error: it.error.map(|error| error * unit),
+            effective_masses: masses.get(it.number).copied(),
             displacement: shape.displacement,
             rotation: shape.rotation,
         }
@@ -384,6 +389,17 @@ impl GridModes<'_> {
             normalize_mode_shape(&shape.collect::<Vec<Vec<Increment>>>(), length)
         };
         self.pairs.iter().map(shape).collect()
+    }
+
+    /// The effective masses of the modes, in the scenario's unit of mass.
+    fn effective_masses(&self, physics: &Physics) -> Vec<[f64; 3]> {
+        let (leaf, state) = (&self.level.leaf, &self.level.state);
+        let unit = physics.mass_unit();
+        let of = |pair: &Eigenpair| {
+            let masses = modes::effective_masses(leaf, physics, state, &pair.shape);
+            masses.map(|mass| mass * unit)
+        };
+        self.pairs.iter().map(of).collect()
     }
 }
 

@@ -29,6 +29,7 @@ mod small_motions;
 pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
+pub use crate::leaf::{BucklingMode, BucklingMotion};
 use crate::memory;
 pub use crate::motion::AssumedMotion;
 pub use crate::newton::{EquilibriumFailure, SolverCounts};

@@ -14,6 +14,7 @@
 //! The loads come first because straight veins of unequal chords that are compressed before
 //! they are bent buckle at once, to either side; after their loads they are bent already.
 
+use crate::leaf::BucklingMode;
 use crate::words;
 use serde::Serialize;
 use std::fmt;
@@ -85,6 +86,9 @@ pub enum StabilityLoss {
     Branched {
         /// Whether to turn to the other side was as good: a mirror image.
         equally_open: bool,
+        /// What the veins do in the mode along which the leaf turned, if it was seen.
+        #[serde(flatten)]
+        mode: Option<BucklingMode>,
     },
 }
 
@@ -139,10 +143,18 @@ impl fmt::Display for Event {
         let percent = 100.0 * self.part;
         let what = match self.happening {
             StabilityLoss::Snapped => "snapped",
-            StabilityLoss::Branched { equally_open: true } => "turned to one of two equal sides",
+            StabilityLoss::Branched {
+                equally_open: true, ..
+            } => "turned to one of two equal sides",
             StabilityLoss::Branched { .. } => "turned aside",
         };
-        write!(f, "{what} at {percent:.0} % of {}", self.stage)
+        write!(f, "{what} at {percent:.0} % of {}", self.stage)?;
+        match self.happening {
+            StabilityLoss::Branched {
+                mode: Some(mode), ..
+            } => write!(f, " (it {mode})"),
+            _ => Ok(()),
+        }
     }
 }
 

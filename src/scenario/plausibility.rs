@@ -162,6 +162,40 @@ remarks! {
             /// Whether the weight is that of its mass, by an acceleration.
             of_mass: bool,
         } = "too-long",
+        /// A material denser than any.
+        #[error(
+            "{key} is {} kg/m³ in the units of the scenario, and osmium, the densest material, has 22600; check it and its unit: with lengths in {length}, forces in {force} and times in s, water has {}",
+            four_digits(*.density), four_digits(*.water)
+        )]
+        DenserThanAnything {
+            /// The key of the scenario.
+            key: &'static str,
+            /// Mass per volume, in kg/m³.
+            density: f64,
+            /// The unit of length.
+            length: String,
+            /// The unit of force.
+            force: String,
+            /// That of water in the units of the scenario.
+            water: f64,
+        } = "denser-than-anything",
+        /// A material stiffer than any.
+        #[error(
+            "{key} is {} GPa in the units of the scenario, and diamond, the stiffest material, has 1200; check it and its unit: with lengths in {length} and forces in {force}, 1 GPa is {}",
+            four_digits(1e-9 * .young), four_digits(*.gigapascal)
+        )]
+        StifferThanDiamond {
+            /// The key of the scenario.
+            key: &'static str,
+            /// Young's modulus, in Pa.
+            young: f64,
+            /// The unit of length.
+            length: String,
+            /// The unit of force.
+            force: String,
+            /// A gigapascal in the units of the scenario.
+            gigapascal: f64,
+        } = "stiffer-than-diamond",
         /// A weight that is not that of the mass.
         #[error(
             "load.gravity is {} per length, and the mass per length is {}: the acceleration of gravity would be {}; check both and their units",
@@ -238,7 +272,12 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
         fan_angles_in_degrees(scenario),
         clamp_angle_in_degrees(scenario),
     ];
-    angles.into_iter().chain(lengths).flatten().collect()
+    let materials = [
+        denser_than_anything(scenario),
+        stiffer_than_diamond(scenario),
+    ];
+    let all = angles.into_iter().chain(lengths).chain(materials);
+    all.flatten().collect()
 }
 
 /// The one of them that most probably keeps a leaf from coming to rest.
@@ -334,6 +373,58 @@ fn section_wider_than_vein_long(scenario: &Scenario) -> Option<PlausibilityWarni
         vein,
         side: side(vein),
         length: rod.length,
+    })
+}
+
+/// Density of osmium, in kg/m³, and Young's modulus of diamond, in Pa (Lide, CRC Handbook of Chemistry and
+/// Physics, 85th ed., sections 4 and 12): no material has more.
+const LARGEST_DENSITY: f64 = 2.26e4;
+const LARGEST_YOUNG: f64 = 1.22e12;
+
+/// Density of water, in kg/m³.
+const WATER: f64 = 1e3;
+
+/// A material denser than any, where units are named.
+fn denser_than_anything(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let units = &scenario.units;
+    let (metres, newtons) = (units.meters()?, units.newtons()?);
+    if !units.is_in_seconds() {
+        return None;
+    }
+    let (key, largest) = match &scenario.blade {
+        Some(blade) => ("blade.mass_density", blade.largest_mass_density()?),
+        None => (
+            "section.mass_density",
+            scenario.radii.largest_mass_density()?,
+        ),
+    };
+    // The unit of mass is that of force times a second squared over that of length.
+    let unit = newtons / metres.powi(4);
+    let density = unit * largest;
+    (density > LARGEST_DENSITY).then(|| PlausibilityWarning::DenserThanAnything {
+        key,
+        density,
+        length: units.length.clone().unwrap_or_default(),
+        force: units.force.clone().unwrap_or_default(),
+        water: WATER / unit,
+    })
+}
+
+/// A material stiffer than any, where units are named.
+fn stiffer_than_diamond(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let units = &scenario.units;
+    let unit = units.newtons()? / units.meters()?.powi(2);
+    let (key, largest) = match &scenario.blade {
+        Some(blade) => ("blade.young", blade.largest_young()),
+        None => ("section.young", scenario.radii.largest_young()?),
+    };
+    let young = unit * largest;
+    (young > LARGEST_YOUNG).then(|| PlausibilityWarning::StifferThanDiamond {
+        key,
+        young,
+        length: units.length.clone().unwrap_or_default(),
+        force: units.force.clone().unwrap_or_default(),
+        gigapascal: 1e9 / unit,
     })
 }
 
@@ -507,6 +598,40 @@ mod tests {
             assert_eq!(said, [wanted]);
         }
         assert_eq!(doubts(1.2), []);
+    }
+
+    /// Materials in other units than those of the scenario: 0.8 g/cm³ and 500 MPa as they stand, in cm and N.
+    #[test]
+    fn materials_that_there_are_not_are_doubted() {
+        let doubts = |density: f64, young: f64, of: &str| {
+            let material = format!("young = {young:e}, mass_density = {density:e}");
+            let leaf = match of {
+                "section" => format!(
+                    "leaf = {{ rods = 1, length = 3.0, fan = [0.0] }}\nsection = {{ shape = \"circle\", diameter = 0.2, {material} }}"
+                ),
+                _ => format!(
+                    "leaf = {{ rods = 5 }}\nblade = {{ length = 20.0, width = {{ at = [0.0, 1.0], value = [1.0, 2.0] }}, thickness = 0.03, {material} }}"
+                ),
+            };
+            let text = format!(
+                "units = {{ length = \"cm\", force = \"N\", time = \"s\" }}\n{leaf}\nload = {{ g = [0.0, 0.0, -1e-9] }}"
+            );
+            let said = plausibility_warnings(&Scenario::from_toml(&text).unwrap());
+            said.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        for of in ["section", "blade"] {
+            assert_eq!(doubts(8e-6, 5e4, of), Vec::<String>::new(), "{of}");
+            // A thousand times too dense: 800,000 kg/m³.
+            let said = doubts(8e-3, 5e4, of);
+            let wanted = format!("{of}.mass_density is 800000 kg/m³");
+            assert!(said[0].starts_with(&wanted), "{said:?}");
+            assert!(said[0].ends_with("water has 0.00001"), "{said:?}");
+            // In Pa in place of N/cm²: 5 TPa.
+            let said = doubts(8e-6, 5e8, of);
+            let wanted = format!("{of}.young is 5000 GPa");
+            assert!(said[0].starts_with(&wanted), "{said:?}");
+            assert!(said[0].ends_with("1 GPa is 100000"), "{said:?}");
+        }
     }
 
     /// A weight of another mass may keep a leaf from coming to rest.

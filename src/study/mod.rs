@@ -9,8 +9,10 @@ mod fit;
 mod judge;
 mod map;
 mod margin;
+mod parameter_grid;
 mod remark;
 mod sensitivity;
+mod sweep;
 mod trace;
 mod unbend;
 pub(crate) mod vary;
@@ -66,6 +68,10 @@ pub use crate::study::remark::{
 pub use crate::study::sensitivity::{
     SensitivityError, relax_with_sensitivities, sensitivities_of_tracker,
 };
+pub use crate::study::sweep::columns::{
+    ColumnKind, ColumnValue, LeafColumn, LeafQuantity, UnknownColumn, quantities_of_leaf,
+};
+pub use crate::study::sweep::{Sweep, SweepRefused, SweepRequest, SweepRow, sweep};
 pub use crate::study::trace::result::{ForceDisplacementLine, PointMotion, TraceShow, TraceUntil};
 pub use crate::study::trace::{
     MOST_BRANCHES, MOST_POINTS, PointKind, Trace, TraceBranch, TraceError, TracePoint,

@@ -23,7 +23,8 @@ pub enum SensitivityError {
 
 /// Relaxes the leaf of `base` and computes the derivatives of its tip, its energy and its lowest
 /// eigenvalue with respect to these numbers of its scenario, as
-/// [`Equilibrium::sensitivities`]; none if the leaf is not at rest.
+/// [`Equilibrium::sensitivities`]; none if the leaf is not at rest. A key of a list or of a profile stands
+/// for all of its entries, or the values at all of its knots.
 pub fn relax_with_sensitivities(
     base: &BaseScenario,
     keys: &[ParameterKeys],
@@ -34,7 +35,8 @@ pub fn relax_with_sensitivities(
         return Err(SensitivityError::Method);
     }
     let scenario = base.scenario();
-    let values = values_of_keys(base, keys)?;
+    let keys = keys_of_numbers(base, keys);
+    let values = values_of_keys(base, &keys)?;
     let numbers = named_parameters(base, &values);
     let RelaxedLeaf {
         result: mut leaf,
@@ -77,6 +79,12 @@ pub fn sensitivities_of_tracker(
         scenario.tolerance,
         0,
     ))
+}
+
+/// The keys with every entry of a list and every knot of a profile in place of these.
+fn keys_of_numbers(base: &BaseScenario, keys: &[ParameterKeys]) -> Vec<ParameterKeys> {
+    let each = keys.iter().flat_map(|keys| base.keys_by_entry(keys));
+    each.collect()
 }
 
 /// Each of the keys with its number.

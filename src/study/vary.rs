@@ -495,11 +495,19 @@ impl BaseScenario {
     /// # Errors
     /// If the scenario is then invalid, or has no such entry.
     pub fn with_value(&self, keys: &ParameterKeys, value: f64) -> Result<BaseScenario, VaryError> {
+        self.with_values(&[(keys, value)])
+    }
+
+    /// The base with these values substituted permanently.
+    ///
+    /// # Errors
+    /// If the scenario is then invalid, or has no such entry.
+    pub fn with_values(&self, values: &[(&ParameterKeys, f64)]) -> Result<BaseScenario, VaryError> {
         let VariedScenario {
             scenario,
             solver_settings: knobs,
-        } = self.scenario_with_values(&[(keys, value)])?;
-        let given = overrides_for_values(&[(keys, value)]);
+        } = self.scenario_with_values(values)?;
+        let given = overrides_for_values(values);
         Ok(BaseScenario {
             entries: self.entries.replaced(&given)?,
             overrides: [&self.overrides[..], &given].concat(),
@@ -585,7 +593,14 @@ impl BaseScenario {
                 }
                 Some(value) if found.is_none_or(|found| found == value) => found = Some(value),
                 Some(_) => return refuse("has another value than the keys it is joined to"),
-                None => return refuse("is a list or a profile: name one of its entries"),
+                None => {
+                    let value = self.entries.value_at(part);
+                    let entries = value.map(|value| part.number_paths(value));
+                    let example = entries.and_then(|all| all.first().copied());
+                    let example = example.map_or(String::new(), |one| format!(", as {one}"));
+                    let why = format!("is a list or a profile: name one of its entries{example}");
+                    return refuse(&why);
+                }
             }
         }
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))

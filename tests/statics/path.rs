@@ -4,7 +4,8 @@
 //! leaves are tried, `SEED` the first.
 
 use leafdyn::relax::{
-    AttemptEnd, Event, Extent, Path, Route, StabilityLoss, Stage, Strategy, relax,
+    AttemptEnd, BucklingMode, BucklingMotion, Event, Extent, Path, Route, StabilityLoss, Stage,
+    Strategy, relax,
 };
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::real;
@@ -132,9 +133,17 @@ fn a_column_turns_aside_at_its_critical_load() {
     let found = column.relax().unwrap();
     let event = only(events(&found));
     assert_eq!(event.stage, Stage::Loading);
+    // It is softest about d2: it bends up or down.
+    let mode = Some(BucklingMode {
+        kind: BucklingMotion::BendsUpAndDown,
+        vein: None,
+    });
     assert_eq!(
         event.happening,
-        StabilityLoss::Branched { equally_open: true }
+        StabilityLoss::Branched {
+            equally_open: true,
+            mode
+        }
     );
     close("part", event.part, 7.83734744 / weight, 1.0 / 512.0);
     assert!(tip(&found).z < -0.1, "{}", tip(&found));

@@ -430,6 +430,7 @@ mod tests {
             let mode = Mode {
                 eigenvalue,
                 error: Some(1e-9),
+                effective_masses: None,
                 displacement: shape.clone(),
                 rotation: shape,
             };

@@ -522,7 +522,8 @@ fn mark_unconfirmed_reference(
 /// Stroke of the longest stable step.
 const STABLE_STEP_STROKE: Stroke = Stroke::new(Color(170, 0, 60), 2.0);
 
-struct VariedAxis {
+/// The axis of a number that varies, with a cell around each of its values.
+pub struct VariedAxis {
     pub axis: Axis,
     /// Edges of the cells, as fractions of the axis: one more than there are cells.
     edges: Vec<f64>,
@@ -530,7 +531,7 @@ struct VariedAxis {
 
 impl VariedAxis {
     /// Cells in the order given, each around its value.
-    fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
+    pub fn from_sweep(vary: &ParameterSweep, units: &Units) -> Self {
         let sign = vary.log.then(|| vary.values[0].signum());
         let scale = |value: &f64| match sign {
             Some(sign) => (sign * value).log10(),
@@ -558,8 +559,35 @@ impl VariedAxis {
         }
     }
 
+    /// The axis of a panel with curves over the values of a sweep: logarithmic where they are, given their sign.
+    pub fn over_values(vary: &ParameterSweep, name: &str, sign: Option<f64>) -> Axis {
+        let axis = Axis::covering_values(name, vary.values.iter().copied(), sign);
+        match vary.keys.is_whole() {
+            true => Axis {
+                ticks: TickPlacement::WholeNumbers(vary.values.clone()),
+                ..axis
+            },
+            false => axis,
+        }
+    }
+
     fn cell_count(&self) -> usize {
         self.edges.len() - 1
+    }
+
+    /// The rectangle of the cell in this column and row of a panel with two axes.
+    pub fn cell_rectangle(
+        panel: PageRectangle,
+        [x, y]: [&VariedAxis; 2],
+        [column, row]: [usize; 2],
+    ) -> PageRectangle {
+        let PageRectangle { corner, size } = panel;
+        let (left, right) = (x.edges[column], x.edges[column + 1]);
+        let (low, high) = (y.edges[row], y.edges[row + 1]);
+        PageRectangle::new(
+            corner + size * DVec2::new(left, 1.0 - high),
+            size * DVec2::new(right - left, high - low),
+        )
     }
 }
 

@@ -17,6 +17,7 @@ mod sensitivity;
 // A browser draws the surface itself.
 #[cfg(not(target_family = "wasm"))]
 mod shaded;
+mod sweep;
 mod trace;
 mod unbend;
 
@@ -31,6 +32,7 @@ pub use crate::figure::motion::{draw_energies as energy, draw_filmstrip as films
 pub use crate::figure::sensitivity::draw as sensitivity;
 #[cfg(not(target_family = "wasm"))]
 pub use crate::figure::shaded::write_surface_picture;
+pub use crate::figure::sweep::draw as sweep;
 pub use crate::figure::trace::draw as trace;
 pub use crate::figure::unbend::draw as unbend;
 use leafdyn::scenario::Scenario;
@@ -327,6 +329,7 @@ mod tests {
         fan.stability.modes = Some(vec![Mode {
             eigenvalue: value,
             error: Some(1e-9),
+            effective_masses: None,
             displacement: shape.clone(),
             rotation: shape,
         }]);

@@ -9,7 +9,8 @@ use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Radii, Scenario};
 use leafdyn::simulate::Record;
 use leafdyn::study::{
-    Chart, Check, Equilibria, Fit, Map, Postures, ScalingStudy, StabilityBoundary, Trace, Unbending,
+    Chart, Check, Equilibria, Fit, Map, Postures, ScalingStudy, StabilityBoundary, Sweep, Trace,
+    Unbending,
 };
 use leafdyn::words;
 use rayon::prelude::*;
@@ -52,6 +53,15 @@ impl WrittenResult for Equilibrium {
         let modes = self.stability.modes.as_deref();
         self.stability.mode_shapes && modes.is_some_and(|modes| !modes.is_empty())
     }
+}
+
+/// Leaves over a grid of numbers.
+impl WrittenResult for Sweep {
+    const JSON: Option<&'static str> = Some("table.json");
+    const FORMATS: &'static [FileFormat<Self>] = &[
+        FileFormat::Table("table.csv", report::write_sweep_table),
+        FileFormat::Figure(["table.svg", "table.png"], figure::sweep),
+    ];
 }
 
 impl WrittenResult for Check {

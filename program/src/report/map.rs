@@ -1,9 +1,8 @@
 //! A map as text, and its rows as CSV.
 
 use crate::report::document::{ReportedResult, map_title};
-use crate::report::numbers::{
-    duration_text, format_five_digits, number_in_key_unit, number_in_unit,
-};
+use crate::report::numbers::{duration_text, format_five_digits, number_in_key_unit};
+use crate::report::sweep::varied_lines;
 use crate::report::table::{LabelledLines, append_csv_rows, label_first_line, text_cell};
 use leafdyn::scenario::Units;
 use leafdyn::study::{Map, MapOutcome, MapRemark};
@@ -32,17 +31,7 @@ impl ReportedResult for ReportedMap<'_> {
 
     fn report_lines(&self, units: &Units) -> LabelledLines {
         let request = &self.map.request;
-        let mut lines = LabelledLines::new();
-        for axis in &request.axes {
-            let ends = [axis.values.first(), axis.values.last()];
-            let text = |&value: &f64| axis.keys.text(value);
-            let [from, to] = ends.map(|end| end.map_or(String::new(), text));
-            let to = number_in_unit(to, units, axis.keys.dimension());
-            let spacing = if axis.log { ", logarithmic" } else { "" };
-            let count = axis.values.len();
-            let text = format!("{} from {from} to {to}: {count} values{spacing}", axis.keys);
-            lines.push(("vary", text));
-        }
+        let mut lines = varied_lines(&request.axes, units);
         let (known, confirmed) = self.map.known_and_confirmed_cells();
         let cells = request.cells();
         let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");

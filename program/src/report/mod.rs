@@ -10,6 +10,7 @@ mod relax;
 #[cfg(test)]
 pub(crate) mod sample;
 mod simulate;
+mod sweep;
 pub(crate) mod table;
 mod trace;
 mod unbend;
@@ -23,6 +24,7 @@ pub use crate::report::document::{
 pub use crate::report::fit::{write_fit_table, write_fitted_scenario};
 pub use crate::report::map::{ReportedMap, write_map_table};
 pub use crate::report::relax::doubt_with_option;
+pub use crate::report::sweep::{ReportedSweep, row_status, write_sweep_table};
 pub use crate::report::table::{
     write_angle_table, write_centerlines, write_modes_table, write_sensitivity_table,
 };

@@ -1,5 +1,7 @@
 //! Formats numbers for people, together with [`leafdyn::numbers`]; nothing else does.
 
+use glam::DVec3;
+use leafdyn::numbers::largest;
 pub use leafdyn::numbers::{format_error_bound, superscript};
 use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::Units;
@@ -166,6 +168,26 @@ pub fn format_position(point: [f64; 3], decimals: usize) -> String {
     format!("({x}, {y}, {z})")
 }
 
+/// Where the tip is, to so many decimals; of free tips their mean and how far the farthest is from it.
+pub fn tips_text(tips: &[DVec3], decimals: usize, units: &Units) -> Option<String> {
+    let place =
+        |tip: DVec3| number_in_unit(format_position(tip.to_array(), decimals), units, LENGTH);
+    if let [tip] = tips {
+        return Some(place(*tip));
+    }
+    let mean = tips.iter().sum::<DVec3>() / tips.len().max(1) as f64;
+    let farthest = largest(tips.iter().map(|tip| tip.distance(mean)));
+    let farthest = round_to_error(farthest, 10f64.powi(-(decimals as i32)));
+    let farthest = number_in_unit(format_five_digits(farthest), units, LENGTH);
+    (!tips.is_empty()).then(|| {
+        let count = tips.len();
+        format!(
+            "{} on average of {count}, up to {farthest} from there",
+            place(mean)
+        )
+    })
+}
+
 /// A number with ten significant digits.
 pub fn format_ten_digits(value: f64) -> String {
     if value == 0.0 || !value.is_finite() {
@@ -318,6 +340,29 @@ mod tests {
         assert_eq!(format_five_digits(round_to_error(3.1575834, 2e-3)), "3.16");
         assert_eq!(round_to_error(1e-12, 1e-9), 0.0);
         assert_eq!([8.9e-9, 1e-8, 3.0].map(decimals_for_error), [8, 8, 0]);
+    }
+
+    /// Free tips have a mean, and the farthest from it, without digits below the error.
+    #[test]
+    fn free_tips_are_told_by_their_mean() {
+        let at = |x: f64, z: f64| DVec3::new(x, 0.0, z);
+        let tips = [at(1.0, 0.25), at(1.0, -0.05), at(1.0, 0.1)];
+        let units = Units {
+            length: Some("cm".into()),
+            ..Units::default()
+        };
+        let text = tips_text(&tips, 3, &units).unwrap();
+        assert_eq!(
+            text,
+            "(1.000, 0, 0.100) cm on average of 3, up to 0.15 cm from there"
+        );
+        assert_eq!(
+            tips_text(&tips[..1], 2, &units).unwrap(),
+            "(1.00, 0, 0.25) cm"
+        );
+        assert_eq!(tips_text(&[], 2, &units), None);
+        let alike = tips_text(&[tips[0], tips[0] + 1e-9], 3, &units).unwrap();
+        assert!(alike.ends_with("up to 0 cm from there"), "{alike}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
     format_five_digits, format_position, format_within_error, grids_text,
     negative_eigenvalues_text, number_in_key_unit, number_in_unit, position_decimals,
-    position_error_text, round_to_error, upper_bound_text, veins_text,
+    position_error_text, round_to_error, tips_text, upper_bound_text, veins_text,
 };
 use crate::report::table::{LabelledLines, label_first_line};
 use glam::DVec3;
@@ -56,11 +56,9 @@ impl ReportedResult for Equilibrium {
             Some(energy) => energy.is_finite(),
             None => self.outcome.is_success(),
         };
-        if let [tip] = self.tips.as_slice()
-            && is_known
-        {
-            let tip = format_position(tip.to_array(), position_decimals(self));
-            lines.push(("tip", number_in_unit(tip, units, LENGTH)));
+        if is_known {
+            let tips = tips_text(&self.tips, position_decimals(self), units);
+            lines.extend(tips.map(|tips| ("tip", tips)));
         }
         if let Some(energy) = self.energy.filter(|energy| energy.is_finite()) {
             let energy = format_as_accurate(self, energy, energy);
@@ -385,9 +383,12 @@ fn small_motions_line(motions: &SmallMotions, units: &Units) -> String {
     let per_time = units.unit_name(RATE).unwrap_or("per time".into());
     let cycles = units.frequency().unwrap_or("cycles per time".into());
     let listed = |numbers: &[f64], cycle: f64| {
-        let numbers = numbers.iter().take(MOST_MODES_LISTED);
-        let texts: Vec<String> = numbers.map(|it| format_five_digits(it / cycle)).collect();
-        texts.join(", ")
+        let errors = motions.errors.iter().flatten().copied();
+        let errors = errors.chain(std::iter::repeat(0.0));
+        let numbers = numbers.iter().zip(errors).take(MOST_MODES_LISTED);
+        let texts = numbers
+            .map(|(it, error)| format_five_digits(round_to_error(it / cycle, error / cycle)));
+        texts.collect::<Vec<_>>().join(", ")
     };
     let growth = listed(&motions.growth_rates, 1.0);
     let frequencies = listed(&motions.frequencies, TAU);

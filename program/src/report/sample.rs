@@ -10,7 +10,7 @@ use leafdyn::study::{
     AccuracySetting, BaseScenario, Chart, ChartOutcome, ChartRemark, ChartRow, ChartRowRemark,
     Check, Map, MapMethod, MapOutcome, MapRemark, MapRequest, MapRow, NeutralDirection,
     PeerProgram, ReferenceConfidence, ReferenceSolution, ScalingRow, ScalingStudy, ShootingResult,
-    ShootingSolution, SolverConfig, TimingSpread,
+    ShootingSolution, SolverConfig, Sweep, SweepRequest, TimingSpread, sweep,
 };
 use leafdyn::{relax, simulate};
 
@@ -42,6 +42,24 @@ pub fn sample_equilibrium(rods: usize, segments: usize) -> Equilibrium {
     let mut leaf = relax::relax(&sample_scenario("fan", rods), &options, &mut |_| {}).unwrap();
     leaf.accuracy.error_estimate = Some(3e-9);
     leaf
+}
+
+/// That fan on coarse grids over these numbers.
+pub fn sample_sweep(vary: &[&str]) -> Sweep {
+    let text = r#"
+        name = "fan"
+        leaf = { rods = 3, length = 1.0, fan = "symmetric" }
+        stiffness = { torsion = 1, bending_2 = 1, bending_3 = 1, axial = 100, shear_2 = 100, shear_3 = 100 }
+        load = { gravity = [0.0, 0.0, -1.0] }
+    "#;
+    let base = BaseScenario::from_text(text.into(), "fan.toml".into(), &[]).unwrap();
+    let options = relax::Options {
+        tolerance: Some(1e-3),
+        modes: 1,
+        ..relax::Options::default()
+    };
+    let axes = vary.iter().map(|axis| axis.parse().unwrap()).collect();
+    sweep(SweepRequest::new(base, axes, options).unwrap(), &|_| ())
 }
 
 /// A check of that fan whose boundary-value solution is turned about x by

@@ -2,13 +2,13 @@
 
 use crate::report::document::ReportedResult;
 use crate::report::numbers::{
-    duration_text, format_error_bound, format_five_digits, format_position, format_within_error,
-    number_in_unit, position_error_text, round_to_error, veins_text_for_count,
+    decimals_for_error, duration_text, format_error_bound, format_five_digits, format_within_error,
+    number_in_unit, position_error_text, round_to_error, tips_text, veins_text_for_count,
 };
 use crate::report::table::{LabelledLines, label_first_line};
 use leafdyn::numbers::{larger, largest};
 use leafdyn::scenario::Units;
-use leafdyn::scenario::units::{ENERGY, LENGTH, TIME};
+use leafdyn::scenario::units::{ENERGY, TIME};
 use leafdyn::simulate::{LandingRecord, Record, SchemeReason};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
@@ -38,11 +38,13 @@ impl ReportedResult for Record {
             .iter()
             .map(|landing| landing_line(landing, units));
         lines.extend(label_first_line("landing", landings));
-        if let [tip] = self.tips.as_slice() {
-            let decimals = (POSITION_DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0);
-            let tip = format_position(tip.to_array(), decimals as usize);
-            lines.push(("tip", number_in_unit(tip, units, LENGTH)));
-        }
+        let known = self.moments.iter().filter_map(|moment| moment.error);
+        let decimals = match known.reduce(f64::max) {
+            Some(error) => decimals_for_error(error),
+            None => (POSITION_DECIMALS - self.length.log10().floor()).clamp(0.0, 15.0) as usize,
+        };
+        let tips = tips_text(&self.tips, decimals, units);
+        lines.extend(tips.map(|tips| ("tip", tips)));
         lines.push(("error", tip_error_line(self, units)));
         lines.push(("speed", speed_line(self)));
         lines

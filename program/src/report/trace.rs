@@ -185,7 +185,7 @@ fn point_values_text(trace: &Trace, point: &TracePoint) -> String {
         let error = trace.tolerance * force.length();
         let [x, y, z] = force
             .to_array()
-            .map(|it| format_four_digits(round_to_error(it, error)));
+            .map(|it| format_four_digits(round_to_error(it, error)).replace('\u{2212}', "-"));
         number_in_unit(format!("({x}, {y}, {z})"), &trace.units, FORCE)
     };
     let reaction = point.reaction.as_ref().map(text);
@@ -227,7 +227,9 @@ fn critical_point_line(trace: &Trace, point: &TracePoint, before: usize) -> Stri
         None => String::new(),
     };
     let (value, after) = (varied_value_text(trace, point), point.index);
-    format!("{what} at {value}{within}: index {before} to {after}")
+    let mode = point.critical_mode.filter(|_| after > before);
+    let mode = mode.map_or(String::new(), |mode| format!(": it {mode}"));
+    format!("{what} at {value}{within}: index {before} to {after}{mode}")
 }
 
 /// Where growth begins or ends, with the frequency there.

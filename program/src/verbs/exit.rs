@@ -103,6 +103,15 @@ impl ExitStatus {
         }
     }
 
+    /// The status of a table one of whose leaves has this status.
+    pub fn of_leaf(status: i32) -> Self {
+        match status {
+            0 => ExitStatus::Success,
+            1 => ExitStatus::Failure,
+            _ => ExitStatus::Refused,
+        }
+    }
+
     /// The number that the process ends with: of a signal 128 and its number.
     pub fn exit_code(self) -> i32 {
         match self {

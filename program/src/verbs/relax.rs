@@ -1,8 +1,8 @@
 //! `leafdyn relax`: brings a leaf to rest.
 
 use crate::files::{FileKind, LIVE_PAGE_FILE};
-use crate::report::doubt_with_option;
 use crate::report::numbers::format_five_digits;
+use crate::report::{ReportedSweep, doubt_with_option, row_status};
 use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal, print_note};
 use crate::verbs::help::EXPERT_OPTIONS_HEADING;
 use crate::verbs::progress::{ProgressLine, completed_fraction};
@@ -15,10 +15,13 @@ use leafdyn::relax::{Equilibrium, Method, Options, Outcome, Progress, Route, Set
 use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
-    DEFAULT_VEINS_TOLERANCE, Equilibria, MarginError, MarginProgress, ParameterKeys, RefinedBlade,
-    SensitivityError, UnbendError, VeinsError, read_postures, relax_from_points,
+    ColumnKind, DEFAULT_VEINS_TOLERANCE, Equilibria, LeafColumn, LeafQuantity, MarginError,
+    MarginProgress, ParameterKeys, ParameterSweep, RefinedBlade, SensitivityError, Sweep,
+    SweepRequest, UnbendError, VeinsError, read_postures, relax_from_points,
 };
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::Instant;
 
 /// Eigenvalues that are reported by default.
 const DEFAULT_MODES: usize = 3;
@@ -91,6 +94,14 @@ pub struct RelaxArguments {
     /// Solve for the whole leaf, even if half of it would do
     #[arg(long, help_heading = EXPERT_OPTIONS_HEADING)]
     full_model: bool,
+
+    /// A table of leaves in place of one: a row for every value of a number of the scenario as in --set, an entry of a list counted from 0 (load.gravity[2]), or method.segments; may repeat, for all combinations; several keys that vary together are joined by +
+    #[arg(long, value_name = "KEY=FROM..TO[:COUNT][log]", conflicts_with_all = ["all", "margin", "sensitivity", "start"])]
+    vary: Vec<ParameterSweep>,
+
+    /// With --vary: what the figure shows, a panel each: columns of the table as tip_z, frequency_1, peak_stress; left out: the coordinate of the tip that varies most
+    #[arg(long, value_name = "LIST", value_delimiter = ',', requires = "vary")]
+    show: Vec<LeafQuantity>,
 }
 
 /// How many veins a leaf is relaxed with in place of those of the scenario.
@@ -172,6 +183,9 @@ impl RelaxArguments {
             }
             _ => {}
         }
+        if !self.vary.is_empty() {
+            return self.run_sweeps();
+        }
         let start: Vec<PathBuf> = self.start.iter().cloned().collect();
         let traits = VerbTraits {
             varies_numbers: !self.sensitivity.is_empty(),
@@ -218,6 +232,72 @@ impl RelaxArguments {
         let live = live.map(|page| job.write_table(LIVE_PAGE_FILE, page.as_bytes()));
         let written = [job.write_files(&equilibrium)].into_iter().chain(live);
         job.deliver_written(&equilibrium, success, &equilibrium, written)
+    }
+
+    /// Relaxes the leaves over a grid of numbers of every scenario.
+    fn run_sweeps(&self) -> Result<ExitStatus, Refusal> {
+        if let Some(VeinsChoice::Refined(_)) = self.veins {
+            let why = "not with --vary: vary leaf.rods";
+            return Err(format!("--veins auto: {why}").into());
+        }
+        let is_number =
+            |show: &&LeafQuantity| matches!(show.kind(), ColumnKind::Number | ColumnKind::Count);
+        if let Some(show) = self.show.iter().find(|show| !is_number(show)) {
+            return Err(format!("--show {show}: is no number, of which a figure is made").into());
+        }
+        let traits = VerbTraits {
+            varies_numbers: true,
+            value_option: Some("--vary"),
+            keeps_partial_result: true,
+            ..VerbTraits::default()
+        };
+        (self.request).run_each_scenario::<Sweep>(traits, |job| self.sweep_scenario(job))
+    }
+
+    fn sweep_scenario(&self, job: &ScenarioJob) -> Result<DeliveredResult, Refusal> {
+        let method = self.method_with_options()?;
+        let options = Options {
+            modes: match self.modes {
+                None if method.is_shooting() => 0,
+                asked => asked.unwrap_or(DEFAULT_MODES),
+            },
+            mode_shapes: !method.is_shooting() || self.modes.is_some_and(|count| count > 0),
+            ..self.options(job)?
+        };
+        let mut request = SweepRequest::new(job.base.clone(), self.vary.clone(), options)?;
+        for &quantity in &self.show {
+            let is_there = |column: &LeafColumn| column.quantity == quantity;
+            if !request.columns.iter().any(is_there) {
+                if quantity.modes() > request.options.modes {
+                    let modes = quantity.modes();
+                    return Err(format!("--show {quantity}: ask for it by --modes {modes}").into());
+                }
+                request.columns.extend(LeafColumn::with_errors(&[quantity]));
+            }
+        }
+        let (all, clock) = (request.leaves(), Instant::now());
+        let line = Mutex::new(job.progress_line());
+        let mut sweep = study::sweep(request, &|done| {
+            if let Ok(mut line) = line.lock() {
+                line.update(completed_fraction(done, all), || {
+                    format!("{done} of {all} leaves")
+                });
+            }
+        });
+        drop(line);
+        if job.is_interrupted() && sweep.rows.is_empty() {
+            return Err(InterruptedRun("no leaf was finished").into());
+        }
+        sweep.show.clone_from(&self.show);
+        let reported = ReportedSweep {
+            sweep: &sweep,
+            seconds: clock.elapsed().as_secs_f64(),
+        };
+        let status = sweep.rows.iter().map(row_status).max();
+        let written = [job.write_files(&sweep)];
+        let mut delivered = job.deliver_written(&sweep, true, &reported, written)?;
+        delivered.raise_status(ExitStatus::of_leaf(status.unwrap_or_default()));
+        Ok(delivered)
     }
 
     /// The method with its options; refused if they do not fit the method.

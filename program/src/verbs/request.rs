@@ -241,6 +241,8 @@ impl ScenarioArguments {
     fn table_name<R: WrittenResult>() -> String {
         match R::JSON.and_then(|name| name.strip_suffix(".json")) {
             None | Some("summary") => "table.csv".to_string(),
+            // A sweep of each of them is a table itself.
+            Some("table") => "tables.csv".to_string(),
             Some(verb) => format!("{verb}_table.csv"),
         }
     }
@@ -443,6 +445,13 @@ pub struct DeliveredResult {
     pub(super) json: Vec<u8>,
     /// Why its files could not be written.
     pub(super) error: Option<String>,
+}
+
+impl DeliveredResult {
+    /// Ends with a status that is at least this one.
+    pub fn raise_status(&mut self, status: ExitStatus) {
+        self.status = self.status.max(status);
+    }
 }
 
 /// One of several scenarios without a result: why it was refused, or that the run was stopped.

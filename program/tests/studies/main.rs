@@ -11,5 +11,6 @@ mod shape_tables;
 mod simulate_choice;
 mod simulate_cli;
 mod simulate_doubts;
+mod sweep_cli;
 mod trace_cli;
 mod unbend_cli;

@@ -278,3 +278,37 @@ fn options_that_help_are_told() {
     assert_eq!(trace["branches"][0]["end"], "unstable");
     assert_eq!(trace["branches"].list().len(), 3);
 }
+
+/// Euler's column buckles about the axis of its smaller bending stiffness, at pi^2/4 of that, and the report
+/// says how.
+#[test]
+fn a_branch_that_is_lost_says_how_the_leaf_buckles() {
+    let place = Workplace::empty();
+    let stiff = "axial = inf, shear_2 = inf, shear_3 = inf";
+    for (bending_2, bending_3, how) in [
+        (1.0, 9.0, "it bends up or down"),
+        (9.0, 1.0, "it bends sideways"),
+    ] {
+        let column = format!(
+            "name = \"column\"\nleaf = {{ rods = 1, length = 1.0, fan = [0.0] }}\n\
+             stiffness = {{ torsion = 5.0, bending_2 = {bending_2}, bending_3 = {bending_3}, {stiff} }}\n"
+        );
+        place.write("column.toml", column);
+        let run = place.ok("trace column.toml --vary load.tip_force[0]=-1..-4 --write none");
+        run.says(&[
+            "branches cross at -2.467401",
+            &format!("index 0 to 1: {how}"),
+        ]);
+    }
+    // Loaded slowly beyond that, it turns aside likewise.
+    place.write(
+        "loaded.toml",
+        format!(
+            "name = \"loaded\"\nleaf = {{ rods = 1, length = 1.0, fan = [0.0] }}\n\
+             stiffness = {{ torsion = 5.0, bending_2 = 9.0, bending_3 = 1.0, {stiff} }}\n\
+             load = {{ tip_force = [-3.0, 0.0, 0.0] }}\n"
+        ),
+    );
+    let run = place.ok("relax loaded.toml --write none");
+    run.says(&["turned to one of two equal sides", "(it bends sideways)"]);
+}

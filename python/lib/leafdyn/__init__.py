@@ -14,7 +14,7 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 from ._branches import Boundary, Branch, Curve, Piece, Trace
 from ._errors import LeafWarning, MissingScenarioError, RefusedLeaf, ScenarioError
 from ._explore import Exploration, explore
-from ._fit import Candidate, Fit, Parameter
+from ._fit import Candidate, Fit, LikelihoodProfile, Parameter
 from ._fitting import fit
 from ._follow import boundary, trace
 from ._format import Key, example, keys, new, schema
@@ -58,6 +58,7 @@ __all__ = [
     "Frame",
     "Key",
     "LeafWarning",
+    "LikelihoodProfile",
     "Map",
     "Mesh",
     "MissingScenarioError",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,14 @@ from ._leaf import Array
 from ._result import Contents, Table, read_only
 from ._view import Viewed
 
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
 
 def _points(
     columns: dict[str, NDArray[Any]], lines: list[Array], units: Mapping[str, str], value: str = "value"
-) -> Any:
+) -> Dataset:
     """Columns and centerlines of points as a data set."""
     variables = column_variables(columns, ("point",), value)
     least = min((line.shape[1] - 1 for line in lines), default=0)
@@ -161,11 +165,11 @@ class Branch:
         ends = [*begins[1:], len(steps)]
         return [Piece(bool(steps[begin]), slice(int(begin), int(end) + 1)) for begin, end in zip(begins, ends)]
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """Its `columns` as a ``pandas.DataFrame``."""
         return table(self.columns, self._units, {}, value=self.key)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `curves` at the nodes that all have."""
         return _points(self.columns, self.curves, self._units, self.key)
 
@@ -317,11 +321,11 @@ class Curve:
         """The Morse index before and behind each point along the first number, shape (P, 2)."""
         return np.stack([self.columns["index_before"], self.columns["index_behind"]], axis=1)
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """Its `columns` as a ``pandas.DataFrame``."""
         return table(self.columns, self._units, {})
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """Its `columns` as an ``xarray.Dataset`` along ``point``, with its `lines` as ``curves``, at the nodes that all have."""
         return _points(self.columns, self.lines, self._units)
 

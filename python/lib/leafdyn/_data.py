@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._dimensions import Dimension, dimension_of_key
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 Units = Mapping[str, str]
 """Names of the units of length, force and time, as far as a scenario gives them."""
@@ -132,7 +135,7 @@ Variable = tuple[Sequence[str], Any, "Dimension | None"]
 
 def dataset(
     variables: Mapping[str, Variable], coordinates: Mapping[str, Any], units: Units, attrs: Mapping[str, Any]
-) -> Any:
+) -> Dataset:
     """An ``xarray.Dataset``; the attribute ``units`` of its variables has the units that have names."""
     package = xarray()
 
@@ -143,9 +146,10 @@ def dataset(
     made = {name: (axes, numbers, named(of)) for name, (axes, numbers, of) in variables.items() if numbers is not None}
     used = {axis for axes, _, _ in made.values() for axis in axes}
     labels = {axis: list(words) for axis, words in LABELS.items() if axis in used}
-    return package.Dataset(
+    found: Dataset = package.Dataset(
         made, {**labels, **coordinates}, {key: word for key, word in attrs.items() if word is not None}
     )
+    return found
 
 
 def node_variables(arrays: Mapping[str, Any], axes: Sequence[str]) -> dict[str, Variable]:

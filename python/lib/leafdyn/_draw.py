@@ -34,6 +34,15 @@ def axes(ax: Any, solid: bool = False) -> Any:
     return pyplot().figure().add_subplot(projection="3d" if solid else None)
 
 
+def stacked(count: int) -> list[Any]:
+    """Axes below each other in a new figure."""
+    if count == 1:
+        return [axes(None)]
+    figure, found = pyplot().subplots(count, layout="constrained", figsize=(6.4, 3.2 * count))
+    del figure
+    return list(found)
+
+
 def labelled(text: str, unit: str | None) -> str:
     """The label of an axis: what is along it, and its unit if that has a name.
 
@@ -62,6 +71,13 @@ def written(unit: str) -> str:
     over = " ".join(above) or "1"
     under = f"({' '.join(below)})" if len(below) > 1 else "".join(below)
     return f"{over}/{under}" if under else over
+
+
+def drawn_plane(ax: Any) -> tuple[int, int]:
+    """The axes along which leaves are drawn in a plane already; left and right, up and down where nothing is."""
+    named = ["xyz".find(label[:1]) if label[1:2] in ("", " ") else -1 for label in (ax.get_xlabel(), ax.get_ylabel())]
+    drawn = all(label for label in (ax.get_xlabel(), ax.get_ylabel()))
+    return (named[0], named[1]) if drawn and min(named) >= 0 and named[0] != named[1] else (0, 2)
 
 
 def ticks_by_length(ax: Any) -> None:

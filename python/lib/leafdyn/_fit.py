@@ -4,21 +4,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _leafdyn
 from ._arguments import texts
 from ._attribute import Attribute, computed
 from ._data import column_unit, column_variables, dataset, pandas
-from ._draw import axes, written
+from ._draw import stacked, written
 from ._leaf import Array
 from ._predict import Measurement, Prediction, draw, predicted, series
+from ._progress import Heard
 from ._result import Contents, Table, read_only
 from ._scenario import Scenario, Source, checked
 from ._sweep import quantity
-from ._traced import draw_points
+from ._traced import POINTS, draw_points, draw_rows
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,69 @@ class Candidate:
     remark: str | None = None
 
 
+@dataclass(frozen=True)
+class Asked:
+    """What a fit was asked for."""
+
+    scenario: Scenario
+    tables: list[Any]
+    keys: list[str]
+    robust: bool
+    maps: list[str]
+    every: int
+    rows: list[str]
+    tolerance: float | None
+
+    def files(self, heard: Heard | None = None, candidates: Any = None) -> Contents:
+        """The fit, as the program writes it."""
+        core, chosen = self.scenario._core, (self.maps, self.every, self.rows)
+        return _leafdyn.fit(core, self.tables, self.keys, self.robust, candidates, *chosen, self.tolerance, heard)
+
+    def held(self, key: str, value: float, every: list[str]) -> Asked:
+        """The same with one of its free numbers held at a value."""
+        given = {text.partition("=")[0]: text for text in self.keys}
+        others = [given.get(name, name) for name in every if name != key]
+        if others and not key.startswith("offset:"):
+            return replace(self, scenario=Scenario(self.scenario, {key: value}), keys=others)
+        # It alone is free, or no number of the scenario: between bounds that are next to each other.
+        scenario = self.scenario if key.startswith("offset:") else Scenario(self.scenario, {key: value})
+        # What was scaled already has the factor one.
+        here = 1.0 if key.startswith("scale:") else value
+        low, high = sorted((here * (1.0 - HELD), here * (1.0 + HELD))) if here else (-HELD, HELD)
+        return replace(self, scenario=scenario, keys=[*others, f"{key}={low!r}..{high!r}"])
+
+
+HELD = 1e-9
+"""Part of its value between which a number is held that cannot be set."""
+
+
+@dataclass(frozen=True, eq=False)
+class LikelihoodProfile:
+    """How well the data are met with one number held, and all others fitted anew.
+
+    Attributes
+    ----------
+    key
+        The number.
+    values
+        Its values, shape (K,).
+    chi_squared
+        The sum of the squares of residuals, in the standard deviations of the fit, shape (K,): at the minimum it is
+        least, and where it is 3.84 more the 95 % interval of a number with known standard deviations ends.
+    """
+
+    key: str
+    values: Array
+    chi_squared: Array
+
+    def to_pandas(self) -> DataFrame:
+        """A ``pandas.DataFrame`` with a row for each value."""
+        return pandas().DataFrame({self.key: self.values, "chi_squared": self.chi_squared})
+
+    def __repr__(self) -> str:
+        return f"<LikelihoodProfile of {self.key}: {len(self.values)} values>"
+
+
 TOLD = 4
 """Numbers that a fit shows."""
 
@@ -127,8 +196,9 @@ class Fit(Table):
     candidates = Attribute[list[Candidate]]("Experiments that could be made, the one that says most first.")
     wall_seconds = Attribute[float]("The time of it all.")
 
-    def __init__(self, files: Contents) -> None:
+    def __init__(self, files: Contents, asked: Asked | None = None) -> None:
         super().__init__(files)
+        self._asked = asked
         said = self.to_dict()
         self.name = said["scenario"]
         self.outcome = said["outcome"]
@@ -175,14 +245,15 @@ class Fit(Table):
         """The scenario with the values in place, as ``fitted.toml``."""
         return Scenario(self._files.contents("fitted.toml").decode())
 
-    def to_pandas(self, table: str = "data") -> Any:
+    def to_pandas(self, table: str = "data") -> DataFrame:
         """One of its tables as a ``pandas.DataFrame``.
 
         Parameters
         ----------
         table
             ``"data"``, a row a datum, as ``fit.csv``; ``"parameters"``, a row a free number: ``value``, ``low``,
-            ``high``, ``standard_error``, ``determined``, ``profiled``; or ``"correlations"``, a square.
+            ``high``, ``standard_error``, ``determined``, ``profiled``; or ``"correlations"`` or ``"covariance"``, a
+            square with the keys as rows and columns.
         """
         keys = list(self.parameters)
         if table == "data":
@@ -190,21 +261,77 @@ class Fit(Table):
         if table == "parameters":
             rows = [asdict(parameter) for parameter in self.parameters.values()]
             return pandas().DataFrame(rows).set_index("key")
-        if table == "correlations":
-            return pandas().DataFrame(self.correlations, keys, keys)
-        raise ValueError(f"table = {table!r}: must be data, parameters or correlations")
+        if table in ("correlations", "covariance"):
+            return pandas().DataFrame(getattr(self, table), keys, keys)
+        raise ValueError(f"table = {table!r}: must be data, parameters, correlations or covariance")
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An ``xarray.Dataset``: its table along ``datum``; the free numbers along ``parameter``, as ``value``, ``low``,
-        ``high``, ``standard_error`` and ``determined``, and ``correlations`` along ``parameter`` and ``other_parameter``."""
+        ``high``, ``standard_error`` and ``determined``, and ``correlations`` and ``covariance`` along ``parameter`` and
+        ``other_parameter``."""
         free = list(self.parameters.values())
         variables = column_variables(self.columns, ("datum",))
         for name in ("value", "low", "high", "standard_error", "determined"):
             variables[name] = (("parameter",), np.array([getattr(one, name) for one in free]), None)
-        variables["correlations"] = (("parameter", "other_parameter"), self.correlations, None)
+        for name in ("correlations", "covariance"):
+            variables[name] = (("parameter", "other_parameter"), getattr(self, name), None)
         keys = list(self.parameters)
         coordinates = {"parameter": keys, "other_parameter": keys}
         return dataset(variables, coordinates, self._units, self._attrs)
+
+    def profile(self, key: str, values: Iterable[float] | None = None) -> LikelihoodProfile:
+        """How well the data are met with one free number held at each of some values, and all others fitted anew.
+
+        Parameters
+        ----------
+        key
+            One of `parameters`.
+        values
+            Left out: nine, over twice its 95 % interval.
+
+        Returns
+        -------
+        LikelihoodProfile
+            With ``values`` and ``chi_squared``.
+
+        Raises
+        ------
+        ValueError
+            If it is not free, its interval has no end and no values are given, or the fit was read from files.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> pull = {"load.tip_force[0]": [4, 8, 12, 16, 20], "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399]}
+        >>> known = {"stiffness.shear_2": 40, "stiffness.shear_3": 50}
+        >>> found = leafdyn.fit("scenarios/measured/pull.toml", pull, "stiffness.axial", set=known)
+        >>> likelihood = found.profile("stiffness.axial")
+        >>> int(likelihood.chi_squared.argmin())
+        4
+        """
+        if key not in self.parameters:
+            raise ValueError(f"key = {key!r}: must be one of {', '.join(self.parameters)}")
+        if self._asked is None:
+            raise ValueError("the data are not in the files of a fit: fit again")
+        free = self.parameters[key]
+        if values is None:
+            if not (math.isfinite(free.low) and math.isfinite(free.high)):
+                raise ValueError(f"{key}: the data give its interval no end: give values")
+            if free.low > 0:
+                ratio = free.high / free.low
+                below, above = (np.geomspace(free.value, free.value * by, 5) for by in (1 / ratio, ratio))
+            else:
+                width = free.high - free.low
+                below, above = (np.linspace(free.value, free.value + by, 5) for by in (-width, width))
+            held = np.concatenate([below[:0:-1], above])
+        else:
+            held = np.array(list(values), dtype=np.float64)
+        sd = self.columns["sd"]
+        sums = []
+        for value in held:
+            columns = Fit(self._asked.held(key, float(value), list(self.parameters)).files()).columns
+            sums.append(float(np.sum(((columns["data"] - columns["model"]) / sd) ** 2)))
+        return LikelihoodProfile(key, held, np.array(sums))
 
     def predict(self, conditions: Source | Mapping[str, Any], what: str | Iterable[str] | None = None) -> Prediction:
         """What the fitted leaf does under other conditions, with 95 % bands.
@@ -274,7 +401,8 @@ class Fit(Table):
         ax
             Where; left out: axes in a new figure.
         show
-            What was measured, as ``"tip_x"``; left out: what was measured most often.
+            What was measured, as ``"tip_x"``; left out: all that was measured, in axes of its own each, or in `ax` what
+            was measured most often.
         against
             The key that varied; left out: that with most values. Numbers that varied in step with it are interpolated;
             experiments that differ in others, too, have curves of their own.
@@ -282,46 +410,68 @@ class Fit(Table):
         Returns
         -------
         matplotlib Axes
+            Of several the first: ``ax.figure.axes`` has all.
 
         Raises
         ------
         ValueError
             If what is to be shown was not measured, or did not vary.
 
-        Where points on veins alone were measured, they are drawn over the fitted veins: in pixels as in their photograph,
-        else from the side, from above or from the front, whichever they show.
+        Points on veins are drawn over the fitted veins: in pixels as in their photograph, else from the side, from above
+        or from the front, whichever they show; where one coordinate alone was measured, over the fraction of the length.
+        What was measured without any number that varies, such as a single frequency, is drawn by its experiments.
         """
-        measured: dict[str, list[Measurement]] = {}
         said = self.to_dict()
         settings = {entry["experiment"]: entry["settings"] for entry in said["experiments"]}
+        points = [row for row in said["residuals"] if row["what"] in POINTS]
+        varied: dict[str, list[Measurement]] = {}
+        others: dict[str, list[Mapping[str, Any]]] = {}
         for row in said["residuals"]:
+            if row["what"] in POINTS:
+                continue
             if settings[row["experiment"]]:
-                measured.setdefault(row["what"], []).append((settings[row["experiment"]], row["data"], row["sd"]))
-        if not measured and show is None and against is None:
-            ax = axes(ax)
-            draw_points(ax, said["residuals"], self._units)
-            return self._titled(ax)
-        if not measured:
+                here = (settings[row["experiment"]], row["data"], row["sd"])
+                varied.setdefault(row["what"], []).append(here)
+            else:
+                others.setdefault(row["what"], []).append(row)
+        if not varied and (show is not None or against is not None) and show not in others:
             raise ValueError("show and against: no number of the scenario was varied in the experiments")
-        show = max(measured, key=lambda name: len(measured[name])) if show is None else show
-        if show not in measured:
-            raise ValueError(f"show = {show!r}: must be one of {', '.join(measured)}")
+        if show is not None:
+            if show not in varied and show not in others:
+                raise ValueError(f"show = {show!r}: must be one of {', '.join([*varied, *others])}")
+            panels: list[str | None] = [show]
+        else:
+            panels = [*varied, *(name for name in others if name not in varied), *([None] if points else [])]
+            if against is not None:
+                panels = [name for name in panels if name in varied]
+            if ax is not None:
+                often = sorted(varied, key=lambda name: -len(varied[name]))
+                panels = [*often, *panels][:1]
+        every = [ax] if ax is not None else stacked(len(panels))
+        for here, name in zip(every, panels):
+            if name is None:
+                draw_points(here, points, self._units)
+            elif name in varied:
+                self._draw_varied(here, varied[name], name, against)
+            else:
+                draw_rows(here, others[name], name, self._units)
+            here.legend()
+        return self._titled(every[0])
+
+    def _draw_varied(self, ax: Any, measured: list[Measurement], show: str, against: str | None) -> None:
+        """Draw one result over a number that was varied."""
         varied: dict[str, set[float]] = {}
-        for here, _, _ in measured[show]:
+        for here, _, _ in measured:
             for key, value in here.items():
                 varied.setdefault(key, set()).add(value)
         against = max(varied, key=lambda key: len(varied[key])) if against is None else against
         if against not in varied:
             raise ValueError(f"against = {against!r}: must be one of {', '.join(varied)}")
-        ax = axes(ax)
-        groups = series(measured[show], against)
-        shown = [(group, self.predict(group.conditions, show)) for group in groups]
-        draw(ax, shown, (show, against), self._units)
-        return self._titled(ax)
+        groups = series(measured, against)
+        draw(ax, [(group, self.predict(group.conditions, show)) for group in groups], (show, against), self._units)
 
     def _titled(self, ax: Any) -> Any:
         ax.set_title("\n".join(self._interval(one) for one in self.parameters.values()), fontsize="small")
-        ax.legend()
         return ax
 
     def _interval(self, parameter: Parameter) -> str:

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from numbers import Integral
 from typing import Any, TypeAlias, Union
 
-from . import _leafdyn
 from ._arguments import numbers, switches, texts
-from ._fit import Fit
+from ._fit import Asked, Fit
 from ._leaf import Array
 from ._measured import Measured, measurements
 from ._progress import Progress, reporter
@@ -115,8 +114,9 @@ def fit(
     leaf = checked(scenario, set)
     tables = measurements(data, "data", leaf.units)
     others = None if candidates is None else measurements(candidates, "candidates", leaf.units)[0]
+    asked = Asked(leaf, tables, keys, robust, maps, int(every), chosen, tolerance)
     with reporter(progress) as heard:
-        found = Fit(_leafdyn.fit(leaf._core, tables, keys, robust, others, maps, int(every), chosen, tolerance, heard))
+        found = Fit(asked.files(heard, others), asked)
     for remark in found.remarks:
         warn(found.name, remark)
     if found.undetermined:

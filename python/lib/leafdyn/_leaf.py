@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from . import _leafdyn
 from ._attribute import Attribute, computed
 from ._data import ENERGY, QUANTITIES, column_unit, dataset, node_table, node_variables
-from ._draw import axes, curves, labelled, smooth, tangents, ticks_by_length
+from ._draw import axes, curves, drawn_plane, labelled, smooth, tangents, ticks_by_length
 from ._pickled import Drawn
 from ._result import keep
 from ._sensitivity import Sensitivity
@@ -19,9 +19,15 @@ from ._surface import Angles, Mesh, angles, mesh
 from ._view import Viewed
 
 if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
+
     from ._scenario import Scenario
 
 Array = NDArray[np.float64]
+
+FLAT = 1e-9
+"""Part of its length by which a rod that lies in a plane leaves it by rounding."""
 
 
 class Equilibrium(Viewed):
@@ -100,7 +106,8 @@ class Equilibrium(Viewed):
 
     @computed
     def error_estimate(self) -> float:
-        """Bound on the error of `positions`, in units of length; infinite on a single grid."""
+        """Bound on the error of `positions`, in units of length, by the grid on which the veins were solved; infinite on a
+        single grid. How far more veins would move a blade is no part of it: see `error_in_veins`."""
         bound = self._core.error_estimate
         return math.inf if bound is None else bound
 
@@ -279,6 +286,13 @@ class Equilibrium(Viewed):
             return np.sqrt(self.eigenvalues)
 
     @computed
+    def effective_masses(self) -> Array | None:
+        """How much of the leaf's mass a base that is shaken along an axis moves in each mode, shape (modes, 3), along x, y
+        and z, in units of mass, on the finest grid: see `leafdyn.modes`; none of leaves whose modes' shapes were not
+        asked for. Those of all modes sum up to the mass of the leaf."""
+        return self._core.effective_masses()
+
+    @computed
     def _mode_shapes(self) -> tuple[Array, Array]:
         return self._core.mode_shapes()
 
@@ -318,7 +332,7 @@ class Equilibrium(Viewed):
         found = {name: getattr(self, name, None) for name in QUANTITIES}
         return {name: array for name, array in found.items() if array is not None}
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``rod``, counted from 1, and ``station``, a fraction of the length:
         the numbers and columns of ``centerlines.csv``.
 
@@ -338,7 +352,7 @@ class Equilibrium(Viewed):
         levels = {"rod": range(1, self.rods + 1), "station": self.stations}
         return node_table(along | self._nodes(), levels, self._units, self._attrs)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An ``xarray.Dataset`` with the dimensions ``rod``, ``station``, and ``component`` (x, y, z), ``director``
         (of strains, forces and moments) or ``quaternion``; of eigenvalues ``mode``.
 
@@ -366,6 +380,7 @@ class Equilibrium(Viewed):
             "eigenvalues": (modes, self.eigenvalues, (0, 0, -2)),
             "eigenvalue_errors": (modes, self.eigenvalue_errors, (0, 0, -2)),
             "frequencies": (modes, self.frequencies, (0, 0, -1)),
+            "effective_masses": ((*modes, "component"), getattr(self, "effective_masses", None), (-1, 1, 2)),
             "mode_displacements": ((*modes, *line, "component"), shapes[0] if some else None, None),
             "mode_rotations": ((*modes, *line, "component"), shapes[1] if some else None, None),
         }
@@ -416,12 +431,13 @@ class Equilibrium(Viewed):
         return angles(self._core)
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
-        """Draw the veins with matplotlib: in space, or from the side in axes without a third axis.
+        """Draw the veins with matplotlib: in space, or from the side in axes without a third axis. A single rod that
+        lies in a plane along two axes is drawn in it.
 
         Parameters
         ----------
         ax
-            Where, as on the axes of another leaf; left out: axes in space, in a new figure.
+            Where, as on the axes of another leaf; left out: axes in space, or in the plane of a rod, in a new figure.
         style
             What ``Axes.plot`` takes. All veins have one colour, and one entry in a legend: the ``label``, which is the
             name of the leaf if it is left out.
@@ -435,16 +451,27 @@ class Equilibrium(Viewed):
         ImportError
             Without matplotlib: ``pip install './python[plot]'``.
         """
-        ax = axes(ax, solid=True)
+        drawn = self._drawn()
+        plane = self._plane(drawn) if ax is None else None
+        ax = axes(ax, solid=plane is None)
         solid = hasattr(ax, "get_zlim")
-        shown = (0, 1, 2) if solid else (0, 2)
-        curves(ax, (vein.T[list(shown)] for vein in self._drawn()), self.name, style)
+        shown = (0, 1, 2) if solid else plane or drawn_plane(ax)
+        curves(ax, (vein.T[list(shown)] for vein in drawn), self.name, style)
         labels = [labelled("xyz"[axis], column_unit(self._units, "xyz"[axis])) for axis in shown]
         ax.set(**dict(zip(("xlabel", "ylabel", "zlabel"), labels)))
         ax.set_aspect("equal")
         if solid:
             ticks_by_length(ax)
         return ax
+
+    def _plane(self, drawn: Array) -> tuple[int, int] | None:
+        """The axes of the plane in which a single rod lies within its error: from the side if it is straight; none of
+        other leaves."""
+        if self.rods != 1 or not np.isfinite(drawn).all():
+            return None
+        within = max(self.error_estimate if math.isfinite(self.error_estimate) else 0.0, FLAT * float(self.lengths[0]))
+        flat = [axis for axis in (1, 2, 0) if np.ptp(drawn[0, :, axis]) <= within]
+        return {1: (0, 2), 2: (0, 1), 0: (1, 2)}[flat[0]] if flat else None
 
     def _drawn(self) -> Array:
         """Its veins as they are drawn: smooth, where their directors are known, shape (N, points, 3)."""
@@ -458,7 +485,10 @@ class Equilibrium(Viewed):
         index = self.negative_eigenvalues
         stable = {None: "stability unknown", 0: "stable"}.get(index, f"unstable ({index} negative eigenvalues)")
         words = [stable if self.success else f"{self.outcome}, {stable}"]
-        within = f" within {self.error_estimate:.1e}" if math.isfinite(self.error_estimate) else ""
+        known_within = math.isfinite(self.error_estimate)
+        within = f" within {self.error_estimate:.1e}" if known_within else ""
+        if known_within and self.error_in_veins is not None:
+            within += f" by its grid, about {self.error_in_veins:.1e} by its number of veins"
         if self.tip is not None:
             # Coordinates that the error exceeds are zero, as in the program's report.
             known = (x if abs(x) > self.error_estimate or not within else 0.0 for x in self.tip)
@@ -466,9 +496,19 @@ class Equilibrium(Viewed):
             words.append(f"tip ({', '.join(f'{x:.5g}' for x in known)}){f' {unit}' if unit else ''}{within}")
         elif within:
             words.append(f"{self.rods} rods{within}")
-        if self.error_in_veins is not None:
-            words.append(f"in veins about {self.error_in_veins:.1e}")
         return f"<Equilibrium {self.name}: {', '.join(words)}>"
+
+    def __eq__(self, other: object) -> bool:
+        """Whether all that the program writes of both is the same to the last bit, but for the time it took."""
+        if not isinstance(other, Equilibrium):
+            return NotImplemented
+        return self._told() == other._told()
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.outcome, self.energy))
+
+    def _told(self) -> dict[str, Any]:
+        return {key: value for key, value in self.to_dict().items() if key not in ("wall_seconds", "version", "source")}
 
     def __getstate__(self) -> dict[str, Any]:
         if isinstance(self._files, _leafdyn.Leaf):
@@ -505,6 +545,7 @@ _LATER = (
     "_base_errors",
     "_reaction_errors",
     "_modes",
+    "effective_masses",
     "_mode_shapes",
     "sensitivities",
 )

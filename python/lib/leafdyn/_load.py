@@ -152,6 +152,7 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
     state |= {
         "_files": files,
         "_request": None,
+        "effective_masses": _array(said["effective_masses"]) if "effective_masses" in said else None,
         "_modes": None if eigenvalues is None else (_array(eigenvalues), _array(errors)),
         "_motions": None
         if said.get("growth_rates") is None
@@ -225,7 +226,14 @@ def _reaction(said: Said) -> tuple[NDArray[np.float64], NDArray[np.float64]] | N
 def _event(said: Said) -> str:
     """As the program says it."""
     aside = "turned to one of two equal sides" if said.get("equally_open") else "turned aside"
-    return f"{aside if said['kind'] == 'branched' else said['kind']} at {100 * said['part']:.0f} % of {said['stage']}"
+    what = f"{aside if said['kind'] == 'branched' else said['kind']} at {100 * said['part']:.0f} % of {said['stage']}"
+    if "motion" not in said:
+        return what
+    most = f", vein {said['vein']} most" if "vein" in said else ""
+    return f"{what} (it {_MOTIONS[said['motion']]}{most})"
+
+
+_MOTIONS = {"twists": "twists", "bends-up-and-down": "bends up or down", "bends-sideways": "bends sideways"}
 
 
 def _equilibria(said: Said, files: Kept) -> Equilibria:

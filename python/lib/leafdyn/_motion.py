@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +16,10 @@ from ._draw import axes, curves, labelled
 from ._leaf import Array
 from ._result import KINDS, chosen, kind
 from ._view import Viewed
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
 
@@ -105,7 +109,7 @@ class Motion(Viewed):
     def _nodes(self) -> dict[str, Array]:
         return {name: getattr(self, name) for name in QUANTITIES if name in self.__dict__}
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``time``, ``rod``, counted from 1, and ``station``: the numbers and
         columns of ``motion.csv``. The `energies` are a table of their own: ``pandas.DataFrame(energies, times)``.
 
@@ -120,7 +124,7 @@ class Motion(Viewed):
         levels = {"time": self.times, "rod": rods, "station": self.stations}
         return node_table(self._nodes(), levels, self._units, self._attrs)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An ``xarray.Dataset`` with the dimensions ``time``, ``rod``, ``station``, and ``component`` or
         ``quaternion``; energies have that of ``time``."""
         variables = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from ._relax import asked_for
 from ._scenario import Scenario
 from ._sensitivity import Sensitivity
 from ._sweep import quantity
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,7 @@ class Prediction:
     leaves: list[Equilibrium]
     _units: Mapping[str, str] = field(default_factory=dict, repr=False)
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """A ``pandas.DataFrame`` with a row for each condition: the numbers that were set, what is predicted, and its
         bands as ``"tip_x_band"``."""
         found: dict[str, Array] = {}

@@ -389,7 +389,8 @@ def modes(
     Returns
     -------
     Equilibrium
-        With ``eigenvalues``, ``eigenvalue_errors``, ``frequencies``, ``mode_displacements`` and ``mode_rotations``.
+        With ``eigenvalues``, ``eigenvalue_errors``, ``frequencies``, ``effective_masses``, ``mode_displacements`` and
+        ``mode_rotations``.
 
     Examples
     --------
@@ -429,7 +430,8 @@ def sensitivities(
     ----------
     keys
         One or more numbers: ``"stiffness.axial"``, ``"load.gravity[2]"``, ``"stiffness.bending_2[5]"``, or
-        ``"scale:stiffness.bending_2"``, all numbers of that key times a factor.
+        ``"scale:stiffness.bending_2"``, all numbers of that key times a factor. A key of a list or of a profile stands
+        for each of its entries, ``"stiffness.bending_2.value[0]"`` and so on.
     modes
         How many frequencies to differentiate; none, and no lowest eigenvalue either, is faster.
 

@@ -9,13 +9,17 @@ import os
 import secrets
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, cast
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _leafdyn
 from ._data import column_variables, dataset, table
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 KINDS = ("json", "csv", "svg", "png")
 
@@ -163,11 +167,11 @@ class Table(Result):
         """The key of which its column ``value`` is."""
         return "value"
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """Its table as a ``pandas.DataFrame``; ``attrs["units"]`` has the units that the scenario names, by columns."""
         return table(self.columns, self._units, self._attrs, value=self._value)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """Its table as an ``xarray.Dataset``, with vectors along ``component``; with the units that the scenario
         names in the attributes of the variables."""
         return dataset(column_variables(self.columns, (self._row,), self._value), {}, self._units, self._attrs)

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._attribute import Attribute
-from ._data import ENERGY, column_variables, dataset, pandas, table, unit, xarray
+from ._data import ENERGY, column_unit, column_variables, dataset, pandas, table, unit, xarray
 from ._draw import axes, labelled
 from ._leaf import Array, Equilibrium
 from ._result import Contents, Result, Table
 from ._view import Viewed
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+    from xarray import Dataset
 
 
 class Check(Result):
@@ -82,7 +86,7 @@ class Equilibria(Viewed, Sequence[Equilibrium]):
     def __iter__(self) -> Iterator[Equilibrium]:
         return iter(self._leaves)
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``equilibrium``, counted from 0, ``rod`` and ``station``."""
         leaves = {number: leaf.to_pandas() for number, leaf in enumerate(self)}
         if not leaves:
@@ -91,18 +95,18 @@ class Equilibria(Viewed, Sequence[Equilibrium]):
         found.attrs = {**self._attrs, "units": leaves[0].attrs["units"]}
         return found
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An ``xarray.Dataset`` as of an `Equilibrium`, with the dimension ``equilibrium`` before: not a number at
         stations that an equilibrium does not have."""
         leaves = [leaf.to_xarray() for leaf in self]
         if not leaves:
             return dataset({}, {}, self._units, self._attrs)
-        found = xarray().concat(
+        found: Any = xarray().concat(
             leaves, "equilibrium", data_vars="all", coords="minimal", compat="override", join="outer"
         )
-        return found.assign_coords(equilibrium=range(len(leaves))).assign(
-            starts=("equilibrium", self.starts), plain=("equilibrium", self.plain)
-        )
+        starts = {"starts": ("equilibrium", self.starts), "plain": ("equilibrium", self.plain)}
+        whole: Dataset = found.assign_coords(equilibrium=range(len(leaves))).assign(starts)
+        return whole
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw all of them with matplotlib, each in a colour: solid if it is stable, dashed if not; with their energies
@@ -133,7 +137,7 @@ class Map(Table):
         names = list(self.columns)
         return tuple(names[: names.index("method")])
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """An ``xarray.Dataset`` over the grid: its dimensions are the numbers that vary, and ``method``."""
         columns, axes = self.columns, (*self.vary, "method")
         places = [np.unique(columns[axis], return_inverse=True) for axis in axes]
@@ -149,8 +153,54 @@ class Map(Table):
         coordinates = {axis: values for axis, (values, _) in zip(axes, places)}
         return dataset(column_variables(grids, axes), coordinates, self._units, self._attrs)
 
+    def plot(self, ax: Any = None, *, method: str | None = None) -> Any:
+        """Draw the outcomes with matplotlib: of all methods over one number, a row each, or of one over two.
+
+        Parameters
+        ----------
+        ax
+            Where; left out: axes in a new figure.
+        method
+            Over two numbers: of which method; left out: the first.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        columns, keys = self.columns, self.vary
+        methods = list(dict.fromkeys(columns["method"].tolist()))
+        if method is not None and method not in methods:
+            raise ValueError(f"method = {method!r}: must be one of {', '.join(methods)}")
+        ax = axes(ax)
+        up = columns[keys[1]] if len(keys) > 1 else np.array([methods.index(one) for one in columns["method"]])
+        shown = columns["method"] == (method or methods[0]) if len(keys) > 1 else np.ones(len(up), dtype=bool)
+        for number, outcome in enumerate(dict.fromkeys(columns["outcome"].tolist())):
+            here = shown & (columns["outcome"] == outcome)
+            if here.any():
+                ax.plot(columns[keys[0]][here], up[here], "s", color=f"C{number % 10}", label=outcome)
+        labels = [labelled(key, column_unit(self._units, key)) for key in keys]
+        ax.set(xlabel=labels[0], ylabel=labels[1] if len(keys) > 1 else "")
+        if len(keys) > 1:
+            ax.set_title(method or methods[0])
+        else:
+            ax.set_yticks(range(len(methods)), methods)
+        for key, scale in zip(keys, (ax.set_xscale, ax.set_yscale)):
+            if _is_even_in_logarithms(np.unique(columns[key])):
+                scale("log" if columns[key].min() > 0 else "symlog")
+        ax.legend()
+        return ax
+
     def __repr__(self) -> str:
         return f"<Map: {len(self.columns['method'])} rows>"
+
+
+def _is_even_in_logarithms(values: NDArray[Any]) -> bool:
+    """Whether values of one sign are spaced evenly in their logarithms, and not in themselves."""
+    if len(values) < 3 or values.dtype.kind not in "if" or values[0] * values[-1] <= 0:
+        return False
+    quotients, steps = values[1:] / values[:-1], np.diff(values)
+    even = np.ptp(quotients) < 1e-3 * abs(quotients[0] - 1)
+    return bool(even and np.ptp(steps) > 1e-3 * abs(steps[0]))
 
 
 class Chart(Table):
@@ -167,6 +217,26 @@ class Chart(Table):
         self._files = files
         self.scaling = None if scaling is None else Table(scaling)
         self.confirmed, self.remarks = confirmed, remarks
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the true error over the time with matplotlib, both logarithmic, a line for each method.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        columns = self.columns
+        ax = axes(ax)
+        for method in dict.fromkeys(columns["method"].tolist()):
+            here = columns["method"] == method
+            seconds, errors = (np.asarray(columns[name][here], dtype=float) for name in ("seconds", "true_error"))
+            known = (seconds > 0) & (errors > 0)
+            if known.any():
+                order = np.argsort(seconds[known])
+                ax.plot(seconds[known][order], errors[known][order], "o-", label=method)
+        ax.set(xlabel="time / s", ylabel="true error / L", xscale="log", yscale="log")
+        ax.legend()
+        return ax
 
     def __repr__(self) -> str:
         said = "confirmed" if self.confirmed else "not confirmed"

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from itertools import product
 from math import nan
-from typing import Any, Literal, SupportsIndex
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex, TypeAlias, Union
 
 import numpy as np
 
-from ._data import column_unit, pandas
+from . import _leafdyn
+from ._data import column_unit, pandas, unit
 from ._errors import RefusedLeaf
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
@@ -19,6 +19,9 @@ from ._quantities import plain
 from ._range import Range, spans, values
 from ._relax import asked_for, relaxed, tells_refusals, warn
 from ._scenario import Scenario, Source, checked
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
 
 Of = Callable[[Equilibrium], Any]
 """What is wanted of a leaf."""
@@ -29,27 +32,22 @@ COLUMNS = ("tip_x", "tip_y", "tip_z", "energy", "stable", "negative_eigenvalues"
 AT_ONCE = 2000
 """Leaves that are kept until what is wanted of them is known."""
 
-_PLAIN = (
-    "energy",
-    "stable",
-    "negative_eigenvalues",
-    "neutral_directions",
-    "error_estimate",
-    "error_in_veins",
-    "outcome",
-    "success",
-    "remark",
-    "residual",
-    "path",
-    "wall_seconds",
-)
+AT_ONCE_WITH_MODES = 200
+"""Leaves that are kept where they have shapes of modes."""
+
+Values: TypeAlias = Union[Range, Iterable[Any]]
+"""What a key takes one after the other."""
+
+Keys: TypeAlias = Union[str, tuple[str, ...]]
+"""A key, or several that take the same value: joined by ``+``, or in a tuple."""
 
 
 def sweep(
     scenario: Source,
-    vary: str | Iterable[str] | Mapping[str, Range | Iterable[Any]],
+    vary: str | Iterable[str] | Mapping[str, Values] | Mapping[Any, Values],
     columns: str | Iterable[str] | Mapping[str, Of] = COLUMNS,
     *,
+    errors: bool = True,
     set: Mapping[str, Any] | None = None,
     tolerance: float | None = None,
     method: str = "semi-implicit",
@@ -61,7 +59,7 @@ def sweep(
     time_limit: float | None = None,
     client: Any = None,
     progress: Progress = None,
-) -> Any:
+) -> DataFrame:
     """Find how a leaf comes to rest over all combinations of some numbers of its scenario, on all cores.
 
     Parameters that are not listed are those of `relax`.
@@ -71,15 +69,20 @@ def sweep(
     vary
         Keys with their values, ``{"load.gravity[2]": np.linspace(-1, -4, 20), "leaf.rods": [3, 5]}``: arrays, lists, or
         ranges ``(low, high)``, ``(low, high, "log")``, ``(low, high, count)``. The last key changes fastest. Several
-        keys joined by ``+`` take the same values. Or the program's words, ``"load.gravity[2]=-1..-4:20"``, or a list of
-        such texts.
+        keys joined by ``+``, or in a tuple, take the same values: ``{("coupling.y", "coupling.z"): (0.5, 2)}``. A key of
+        a whole table takes dicts: ``{"section": [{"thickness": 0.1}, {"thickness": 0.2}]}``. Or the program's words,
+        ``"load.gravity[2]=-1..-4:20"``, or a list of such texts.
     columns
-        ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"reaction_x"`` and so on (of a
-        held tip), ``"grip_1_x"`` and so on, ``"energy"``, ``"stable"``, ``"negative_eigenvalues"``,
-        ``"neutral_directions"``,
-        ``"error_estimate"``, ``"error_in_veins"`` (of blades), ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``,
-        ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time); or a dict of functions
-        of an `Equilibrium`.
+        ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"base_reaction_x"`` and so on (the
+        force on the supports of all bases), ``"base_moment_x"`` (the moment about their mean), ``"reaction_x"`` (of a
+        held tip), ``"grip_1_x"``, ``"peak_stress"`` (the largest equivalent one), ``"energy"``, ``"stable"``,
+        ``"negative_eigenvalues"``, ``"neutral_directions"``, ``"error_estimate"``, ``"error_in_veins"`` (of blades),
+        ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``, ``"margin_waves"``, ``"margin_amplitude"``,
+        ``"twist"``, ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time, as accurate
+        as those of `modes`), ``"growth_rate_1"`` (without a potential); or a dict of functions of an `Equilibrium`.
+    errors
+        Whether every number that has a bound on its error is followed by it: ``"tip_x_error"``,
+        ``"frequency_1_error"``. Such a column can be named, too.
     on_error
         ``"raise"``, or ``"row"``: a leaf that is refused has a row with the outcome ``"refused"``, and the message as
         its ``remark``.
@@ -113,7 +116,7 @@ def sweep(
     --------
     >>> import leafdyn
     >>> grid = {"leaf.rods": [3, 5], "load.gravity[2]": (-1, -2, 2)}
-    >>> leafdyn.sweep("scenarios/paper/fig04.toml", grid, ["tip_z", "stable"]).round(4)
+    >>> leafdyn.sweep("scenarios/paper/fig04.toml", grid, ["tip_z", "stable"], errors=False).round(4)
        leaf.rods  load.gravity[2]   tip_z  stable
     0          3             -1.0 -0.1436    True
     1          3             -2.0 -0.2751    True
@@ -121,7 +124,8 @@ def sweep(
     3          5             -2.0 -0.2791    True
     """
     package = pandas()
-    wanted, modes = _wanted(columns)
+    wanted, kinds = _wanted(columns, errors)
+    modes = max((kind.modes for kind in kinds.values()), default=0)
     asked = asked_for(
         method,
         tolerance,
@@ -130,39 +134,51 @@ def sweep(
         keep_unstable,
         full_model,
         modes,
+        # As accurate as those of `modes`; shooting finds none.
+        modes > 0 and method in ("semi-implicit", "explicit"),
         path=path,
-        veins_error="error_in_veins" in wanted,
+        veins_error="error_in_veins" in kinds,
         time_limit=time_limit,
     )
     told = tells_refusals(on_error)
     base = checked(scenario, set)
-    vary = vary if isinstance(vary, Mapping) else spans(vary)
-    axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in vary.items()}
+    given: Mapping[Any, Any] = vary if isinstance(vary, Mapping) else spans(vary)
+    named = {_joined(keys): span for keys, span in given.items()}
+    axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in named.items()}
     grid = list(product(*axes.values()))
     leaves = [_at(base, dict(zip(axes, point)), told) for point in grid]
     if client is None:
         with reporter(progress) as heard:
-            rows = _solved(leaves, wanted, asked, heard, told)
+            rows = _solved(leaves, wanted, kinds, asked, heard, told)
     else:
-        one = partial(_row, wanted=wanted, asked=asked, told=told)
+        one = partial(_row, wanted=wanted, kinds=kinds, asked=asked, told=told)
         rows = client.gather(client.map(one, leaves, batch_size=max(1, len(leaves) // 100), pure=False))
     failed = sum(not success for success, _ in rows)
     if failed:
         warn(base.name, f"{failed} of {len(rows)} leaves are not at rest within the tolerance: see the column outcome")
     found = package.DataFrame(
         {key: _varied([point[at] for point in grid]) for at, key in enumerate(axes)}
-        | {name: _column(package, name, [row[at] for _, row in rows]) for at, name in enumerate(wanted)}
+        | {name: _column(package, kinds.get(name), [row[at] for _, row in rows]) for at, name in enumerate(wanted)}
     )
-    # That of a table of a map is relative.
-    like = {"error_estimate": "tip_x", "error_in_veins": "tip_x"}
-    units = {name: column_unit(base.units, like.get(name, name)) for name in (*axes, *wanted)}
+    units = {name: column_unit(base.units, name) for name in axes}
+    units |= {name: kind.unit(name, base.units) for name, kind in kinds.items()}
     found.attrs = {"scenario": base.name, "units": {name: unit for name, unit in units.items() if unit is not None}}
     return found
 
 
+def _joined(keys: Keys) -> str:
+    """Keys that take the same value, as the program names them."""
+    return "+".join(keys) if isinstance(keys, tuple) else keys
+
+
 def _at(base: Scenario, point: Mapping[str, Any], told: bool) -> Scenario | RefusedLeaf:
     """The scenario with these values, or why it is refused."""
-    entries = {key: value for keys, value in point.items() for key in keys.split("+")}
+    entries: dict[str, Any] = {}
+    for keys, value in point.items():
+        for key in keys.split("+"):
+            # A whole table has its entries replaced.
+            is_table = isinstance(value, Mapping) and "." not in key
+            entries |= {f"{key}.{name}": part for name, part in value.items()} if is_table else {key: value}
     try:
         return Scenario(base, entries)
     except ValueError as refused:
@@ -172,85 +188,97 @@ def _at(base: Scenario, point: Mapping[str, Any], told: bool) -> Scenario | Refu
         return RefusedLeaf(str(refused))
 
 
+class Kind(NamedTuple):
+    """What the program says of a column."""
+
+    kind: str
+    """``"number"``, ``"count"``, ``"truth"`` or ``"text"``."""
+    dimension: tuple[int, int, int]
+    modes: int
+    """How many of the lowest modes it needs."""
+    has_error: bool
+
+    @property
+    def missing(self) -> Any:
+        """What stands where it is not known."""
+        return nan if self.kind == "number" else None
+
+    def unit(self, name: str, units: Mapping[str, str]) -> str | None:
+        """Its unit, if it has one with a name."""
+        if self.dimension == (0, 0, 0):
+            return None
+        if name.startswith("frequency_") and units.get("time") == "s":
+            return "Hz"
+        return unit(units, self.dimension)
+
+
+Kinds = Mapping[str, Kind]
+
+
 def _solved(
-    leaves: list[Scenario | RefusedLeaf], wanted: Mapping[str, Of], asked: dict[str, Any], heard: Heard | None, told: bool
+    leaves: list[Scenario | RefusedLeaf],
+    wanted: Mapping[str, Of],
+    kinds: Kinds,
+    asked: dict[str, Any],
+    heard: Heard | None,
+    told: bool,
 ) -> list[tuple[bool, list[Any]]]:
     """What is wanted of every leaf, and whether it is at rest."""
     rows = []
-    for begin in range(0, len(leaves), AT_ONCE):
+    at_once = min(AT_ONCE, AT_ONCE_WITH_MODES) if asked["mode_shapes"] else AT_ONCE
+    for begin in range(0, len(leaves), at_once):
 
         def passed_on(done: float, total: float | None, text: str, begin: int = begin) -> None:
             if heard is not None:
                 heard(begin + done, len(leaves), text)
 
-        found = relaxed(leaves[begin : begin + AT_ONCE], asked, None if heard is None else passed_on, told)
-        rows += [_of(leaf, wanted) for leaf in found]
+        found = relaxed(leaves[begin : begin + at_once], asked, None if heard is None else passed_on, told)
+        rows += [_of(leaf, wanted, kinds) for leaf in found]
     return rows
 
 
 def _row(
-    leaf: Scenario | RefusedLeaf, wanted: Mapping[str, Of], asked: dict[str, Any], told: bool
+    leaf: Scenario | RefusedLeaf, wanted: Mapping[str, Of], kinds: Kinds, asked: dict[str, Any], told: bool
 ) -> tuple[bool, list[Any]]:
-    return _of(relaxed([leaf], asked, None, told)[0], wanted)
+    return _of(relaxed([leaf], asked, None, told)[0], wanted, kinds)
 
 
-def _of(leaf: Equilibrium | RefusedLeaf, wanted: Mapping[str, Of]) -> tuple[bool, list[Any]]:
+def _of(leaf: Equilibrium | RefusedLeaf, wanted: Mapping[str, Of], kinds: Kinds) -> tuple[bool, list[Any]]:
     if isinstance(leaf, RefusedLeaf):
         said = {"outcome": leaf.outcome, "remark": leaf.remark, "success": False}
-        return False, [said.get(name, nan if _is_number(name) else None) for name in wanted]
+        return False, [said.get(name, kinds[name].missing if name in kinds else nan) for name in wanted]
     return leaf.success, [of(leaf) for of in wanted.values()]
 
 
-def _is_number(name: str) -> bool:
-    """Whether a column with this name, of those that have one, has numbers."""
-    return name not in ("stable", "negative_eigenvalues", "neutral_directions", "path")
-
-
-def _wanted(columns: str | Iterable[str] | Mapping[str, Of]) -> tuple[dict[str, Of], int]:
-    """What is wanted, and how many modes that needs."""
+def _wanted(columns: str | Iterable[str] | Mapping[str, Of], errors: bool) -> tuple[dict[str, Of], dict[str, Kind]]:
+    """What is wanted, and what the program says of columns that it knows."""
     if isinstance(columns, Mapping):
-        return dict(columns), 0
-    names = [columns] if isinstance(columns, str) else list(columns)
-    found = {name: quantity(name) for name in names}
-    modes = [int(name.rpartition("_")[2]) for name in names if name.startswith("frequency_")]
-    return found, max([*modes, int("lowest_eigenvalue" in names)], default=0)
+        return dict(columns), {}
+    kinds: dict[str, Kind] = {}
+    for name in [columns] if isinstance(columns, str) else list(columns):
+        kinds[name] = _kind(name)
+        if errors and kinds[name].has_error:
+            kinds.setdefault(f"{name}_error", _kind(f"{name}_error"))
+    return {name: partial(_cell, name=name) for name in kinds}, kinds
+
+
+def _kind(name: str) -> Kind:
+    try:
+        return Kind(*_leafdyn.leaf_column(name))
+    except ValueError as unknown:
+        raise ValueError(f"columns: {name!r} is not known: {unknown}; or a function") from None
 
 
 def quantity(name: str) -> Of:
     """What a name of a result means."""
-    if name in _PLAIN:
-        return partial(_attribute, name=name)
-    if name == "lowest_eigenvalue":
-        return partial(_mode, number=0, of="eigenvalues")
-    place = re.fullmatch(r"(tip|reaction|grip_[1-9]\d{0,5})_([xyz])", name)
-    if place:
-        return partial(_component, vector=place[1], axis="xyz".index(place[2]))
-    mode = re.fullmatch(r"frequency_([1-9]\d{0,5})", name)
-    if mode:
-        return partial(_mode, number=int(mode[1]) - 1, of="frequencies")
-    others = "tip_x, reaction_x, lowest_eigenvalue, frequency_1"
-    raise ValueError(
-        f"columns: {name!r} is not known: must be {others} or the like, {', '.join(_PLAIN)}, or a function"
-    )
+    _kind(name)
+    return partial(_cell, name=name)
 
 
-def _attribute(leaf: Equilibrium, name: str) -> Any:
-    return getattr(leaf, name)
-
-
-def _component(leaf: Equilibrium, vector: str, axis: int) -> float:
-    found: Any
-    if vector.startswith("grip_"):
-        grip = int(vector.removeprefix("grip_")) - 1
-        found = leaf.grip_reactions[grip][0] if grip < len(leaf.grip_reactions) else None
-    else:
-        found = leaf.tips[0] if vector == "tip" else leaf.tip_reaction
-    return nan if found is None else float(found[axis])
-
-
-def _mode(leaf: Equilibrium, number: int, of: str) -> float:
-    found = getattr(leaf, of)
-    return nan if found is None or number >= len(found) else float(found[number])
+def _cell(leaf: Equilibrium, name: str) -> Any:
+    """That of a column in the row of a leaf."""
+    found = leaf._core.column(name)
+    return _kind(name).missing if found is None else found
 
 
 def _varied(column: list[Any]) -> Any:
@@ -262,11 +290,10 @@ def _varied(column: list[Any]) -> Any:
     return column
 
 
-def _column(package: Any, name: str, column: list[Any]) -> Any:
+def _column(package: Any, kind: Kind | None, column: list[Any]) -> Any:
     """A column, with missing values in place of none."""
-    kinds = {"stable": "boolean", "negative_eigenvalues": "Int64"}
-    if name in kinds:
-        return package.array(column, dtype=kinds[name])
-    if name in ("energy", "residual", "error_in_veins"):
-        return np.array([nan if value is None else value for value in column], dtype=np.float64)
+    if kind is not None and kind.kind in ("truth", "count"):
+        return package.array(column, dtype={"truth": "boolean", "count": "Int64"}[kind.kind])
+    if kind is not None and kind.kind == "number":
+        return np.array(column, dtype=np.float64)
     return _varied(column)

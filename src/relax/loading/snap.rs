@@ -7,6 +7,7 @@
 //! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
 //! is Newton's method.
 
+use crate::leaf::BucklingMode;
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};
 use crate::relax::loading::LoadPath;
 use crate::relax::path::StabilityLoss;
@@ -95,7 +96,8 @@ impl LoadPath<'_> {
         let side = lower_energy_side(found).ok_or(stopped)?;
         self.next = side.state;
         let equally_open = side.equally_open;
-        self.record_event(part, StabilityLoss::Branched { equally_open });
+        let mode = BucklingMode::of_increments(&saddle, &mode);
+        self.record_event(part, StabilityLoss::Branched { equally_open, mode });
         Ok(())
     }
 

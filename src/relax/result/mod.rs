@@ -130,6 +130,9 @@ pub struct Mode {
     pub eigenvalue: f64,
     /// Bound on its error; `None` on a single grid.
     pub error: Option<f64>,
+    /// The effective masses along the lab axes, on the finest grid: how much of the leaf's mass a base that is shaken
+    /// along an axis moves in this mode. `None` unless shapes were requested.
+    pub effective_masses: Option<[f64; 3]>,
     /// Displacement of the nodes of [`Shape::curves`], one list per rod. The largest is as
     /// long as the longest rod; for a mode that rotates the rods without displacing them, the
     /// largest rotation is 1. Empty unless shapes were requested.
@@ -227,6 +230,11 @@ impl Serialize for Stability {
             modes.and_then(|modes| modes.iter().map(|mode| mode.error).collect());
         map.serialize_entry("lowest_eigenvalues", &eigenvalues)?;
         map.serialize_entry("eigenvalue_errors", &errors)?;
+        let masses =
+            modes.and_then(|modes| modes.iter().map(|mode| mode.effective_masses).collect());
+        if let Some(masses) = masses.filter(|masses: &Vec<[f64; 3]>| !masses.is_empty()) {
+            map.serialize_entry("effective_masses", &masses)?;
+        }
         SmallMotions::serialize_keys(self.small_motions.as_ref(), &mut map)?;
         if let Some(saddle) = &self.saddle {
             map.serialize_entry("saddle", saddle)?;

@@ -161,6 +161,7 @@ fn path_to_equilibrium(leaf: &Leaf, found: &NestedEquilibrium) -> Option<Path> {
             part: 1.0,
             happening: StabilityLoss::Branched {
                 equally_open: false,
+                mode: None,
             },
         });
     }

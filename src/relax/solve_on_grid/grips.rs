@@ -7,7 +7,7 @@
 //! shortest does not help, the leaf has lost its stability.
 
 use crate::homotopy::{StepEnd, StepSizes};
-use crate::leaf::{DiscreteLeaf, GrippedNode, SpringEnd, State, System};
+use crate::leaf::{BucklingMode, DiscreteLeaf, GrippedNode, SpringEnd, State, System};
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
 use crate::relax::log::WorkLog;
 use crate::relax::path::{Event, StabilityLoss, Stage};
@@ -223,7 +223,8 @@ impl SupportContinuation<'_> {
         let side = saddle::lower_energy_side(sides).ok_or(EquilibriumFailure::Saddle)?;
         self.held.state = side.state;
         let equally_open = side.equally_open;
-        self.record_event(part, StabilityLoss::Branched { equally_open });
+        let mode = BucklingMode::of_increments(&saddle, &mode);
+        self.record_event(part, StabilityLoss::Branched { equally_open, mode });
         Ok(())
     }
 

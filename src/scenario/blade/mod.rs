@@ -151,6 +151,18 @@ impl Blade {
         self.materials[rod].thickness.at(sigma)
     }
 
+    /// The largest mass per volume; none where there is none.
+    pub(super) fn largest_mass_density(&self) -> Option<f64> {
+        let densities = self.materials.iter().flat_map(|of| &of.mass_density);
+        densities.map(Profile::max_abs).reduce(f64::max)
+    }
+
+    /// The largest Young's modulus along the veins, or across them.
+    pub(super) fn largest_young(&self) -> f64 {
+        let moduli = self.materials.iter().map(|of| of.young.max_abs());
+        moduli.fold(0.0, f64::max)
+    }
+
     /// Whether the mass of every vein is given.
     pub fn has_mass(&self) -> bool {
         self.materials.iter().all(|of| of.mass_density.is_some())

@@ -524,6 +524,18 @@ impl Radii {
         Some(section.width.max_abs().max(section.thickness.max_abs()))
     }
 
+    /// The largest mass per volume; none where a section has none.
+    pub(super) fn largest_mass_density(&self) -> Option<f64> {
+        let densities = self.0.iter().map(|section| section.mass_density.max_abs());
+        densities.reduce(f64::max).filter(|density| *density > 0.0)
+    }
+
+    /// The largest modulus of elasticity; none without sections.
+    pub(super) fn largest_young(&self) -> Option<f64> {
+        let moduli = self.0.iter().map(|section| section.young.max_abs());
+        moduli.reduce(f64::max)
+    }
+
     /// Whether the sections have a mass.
     pub fn have_mass(&self) -> bool {
         !self.0.is_empty()

@@ -286,6 +286,9 @@ pub(super) fn assemble_fit(
         says = result_sentences(&parameters, &open, coordinates);
         says.insert(0, lack_of_fit::systematic_residuals_sentence(stats, found));
     }
+    if contradicted {
+        says.insert(0, contradiction_sentence(stats));
+    }
     let outcome = match end {
         GaussNewtonOutcome::Converged if contradicted => FitOutcome::Contradicted,
         GaussNewtonOutcome::Converged if systematic.is_some() => FitOutcome::Systematic,
@@ -609,6 +612,22 @@ fn round_coefficient(value: f64) -> f64 {
 const SMALLEST_WRITTEN_COEFFICIENT: f64 = 5e-3;
 
 /// A sentence for each number and each undetermined combination.
+/// What is said first of data that contradict the model.
+fn contradiction_sentence(stats: &FitStatistics) -> String {
+    let (sum, freedom) = (stats.residuals.norm_squared(), stats.degrees_of_freedom);
+    let sum = format_two_digits(sum);
+    match stats.has_known_deviations {
+        true => format!(
+            "the data contradict the model: the squares of their residuals, in standard deviations, sum up to {sum}, \
+             and {freedom} are expected; intervals mean nothing"
+        ),
+        false => {
+            "the data contradict the model: it is far from most of them; intervals mean nothing"
+                .into()
+        }
+    }
+}
+
 pub(super) fn result_sentences(
     parameters: &[FitParameter],
     open: &[UnidentifiableCombination],
@@ -681,7 +700,17 @@ fn combination_sentence(
         [(a, one), (b, two)] if all_logs && (one.abs() - two.abs()).abs() < 1e-3 => {
             let only = if one * two > 0.0 { "ratio" } else { "product" };
             let how = if open.is_exact { "" } else { "nearly " };
-            format!("{} and {}: {how}only as their {only}", key(*a), key(*b))
+            let [first, second] = [*a, *b].map(|k| parameters[k].value);
+            let value = match only {
+                "ratio" => first / second,
+                _ => first * second,
+            };
+            let value = round_to_three_digits(value);
+            format!(
+                "{} and {}: {how}only as their {only}, {value}",
+                key(*a),
+                key(*b)
+            )
         }
         parts => {
             // In numbers that are not logarithms the combination is a tangent.

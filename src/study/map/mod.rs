@@ -17,6 +17,8 @@ use crate::study::map::cell::MapCell;
 pub use crate::study::map::remark::{MapMotionFailure, MapRemark};
 pub use crate::study::map::result::MapJump;
 use crate::study::map::result::{MapMethod, MapRequest, MapRow};
+use crate::study::parameter_grid;
+use crate::study::parameter_grid::{cell_count, cell_texts, cell_values, check_axes};
 use crate::study::vary::{BaseScenario, ParameterKeys, ParameterSweep, SolverSetting, VaryError};
 use crate::{memory, read_and_write};
 use serde::{Serialize, Serializer};
@@ -101,18 +103,8 @@ impl MapRequest {
         if !(1..=2).contains(&axes.len()) {
             return refuse(format!("{} axes: a map has one or two axes", axes.len()));
         }
-        let targets: Vec<_> = axes.iter().flat_map(|axis| axis.keys.targets()).collect();
-        for (i, target) in targets.iter().enumerate() {
-            if targets[..i].contains(target) {
-                return refuse(format!("{target}: varies twice"));
-            }
-        }
-        let found: usize = axes.iter().map(|axis| axis.values.len()).product();
-        if found > MOST_MAP_CELLS {
-            let allowed =
-                format!("at most {MOST_MAP_CELLS} are allowed; lower the counts of the axes");
-            return refuse(format!("{found} cells: {allowed}"));
-        }
+        check_axes(&axes, MOST_MAP_CELLS, "cells").map_err(MapRefused::Map)?;
+        let found = cell_count(&axes);
         if !(cell_seconds > 0.0 && cell_seconds <= 1e6) {
             let allowed = "must be greater than 0 and at most 1e6";
             return Err(RefusedOption::new("cell_seconds", cell_seconds, allowed).into());
@@ -170,34 +162,22 @@ impl MapRequest {
 
     /// Number of cells.
     pub fn cells(&self) -> usize {
-        self.axes.iter().map(|axis| axis.values.len()).product()
+        cell_count(&self.axes)
     }
 
     /// Index of a cell along each axis.
     pub fn cell_position(&self, cell: usize) -> Vec<usize> {
-        let mut rest = cell;
-        let mut place: Vec<usize> = (self.axes.iter().rev())
-            .map(|axis| {
-                let at = rest % axis.values.len();
-                rest /= axis.values.len();
-                at
-            })
-            .collect();
-        place.reverse();
-        place
+        parameter_grid::cell_position(&self.axes, cell)
     }
 
     /// The varied values of a cell.
     pub fn values(&self, cell: usize) -> Vec<(&ParameterKeys, f64)> {
-        let axes = self.axes.iter().zip(self.cell_position(cell));
-        axes.map(|(axis, at)| (&axis.keys, axis.values[at]))
-            .collect()
+        cell_values(&self.axes, cell)
     }
 
     /// The varied values of a cell as texts, as in tables.
     pub fn texts(&self, cell: usize) -> Vec<String> {
-        let values = self.values(cell).into_iter();
-        values.map(|(keys, value)| keys.text(value)).collect()
+        cell_texts(&self.axes, cell)
     }
 
     /// The longest time step of explicit motion known to be stable in a cell, in the scenario's

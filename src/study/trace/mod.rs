@@ -12,7 +12,7 @@ use crate::branch::{
     ExtrapolatedPoint, LeafFamily, NestedBranchEquations, ParameterRange, VerifiedBranch,
     begin_branch, switch_branches,
 };
-use crate::leaf::{Grid, NodalField, displacement_part};
+use crate::leaf::{BucklingMode, Grid, NodalField, displacement_part};
 use crate::memory;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax,
@@ -553,6 +553,8 @@ impl BranchTracer<'_, '_> {
                 let number = points.len() + 1;
                 points.push(TracePoint {
                     critical_mode_axis: point.modes.first().map(axis_of_largest_displacement),
+                    critical_mode: (point.modes.first())
+                        .and_then(|mode| BucklingMode::of_increments(&point.state, mode)),
                     ..self.trace_point(number, kind, point.indices[1], refined)
                 });
             }
@@ -622,6 +624,7 @@ impl BranchTracer<'_, '_> {
             energy: refined.energy * scale.moment(),
             index,
             critical_mode_axis: None,
+            critical_mode: None,
             motion: None,
             undulation: self.undulation_at(refined).unwrap_or_default(),
             stations: refined.grid.sigma().to_vec(),

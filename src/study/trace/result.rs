@@ -1,6 +1,7 @@
 //! The result of a trace.
 
 use crate::branch::{BranchEnd, CorrectorFailure, VerificationFailure};
+use crate::leaf::BucklingMode;
 use crate::numbers::largest;
 use crate::relax::{AssumedMotion, DominantMotion, MotionInstability};
 use crate::run::join_remarks;
@@ -121,6 +122,8 @@ pub struct TracePoint {
     /// The axis, 0 to 2, along which the leaf moves most in the mode that is neutral here: at critical
     /// points of leaves with a potential.
     pub critical_mode_axis: Option<usize>,
+    /// What the veins do in that mode.
+    pub critical_mode: Option<BucklingMode>,
     /// Its small motions, where loads have no potential.
     pub motion: Option<PointMotion>,
     /// Waves and twist of the veins.

@@ -227,6 +227,7 @@ fn trace_point(
         energy: leaf.energy.unwrap_or(f64::NAN),
         index: unstable_roots.unwrap_or(before),
         critical_mode_axis: None,
+        critical_mode: None,
         motion: Some(PointMotion {
             unstable_roots,
             dominant,
