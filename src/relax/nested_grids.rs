@@ -297,9 +297,7 @@ pub(super) fn solve_first_grid(
                 let at_limit = effort.node_evaluations > WORK.node_evaluations
                     || match stop {
                         EquilibriumFailure::Unresolved => {
-                            fixed
-                                || finer.segments() > finest_resolving
-                                || problem.out_of_time()
+                            fixed || finer.segments() > finest_resolving || problem.out_of_time()
                         }
                         _ => last,
                     };
