@@ -42,6 +42,7 @@ fn mirrored(mut leaf: Scenario, odd: bool) -> Scenario {
         leaf.coupling.push(middle);
     }
     leaf.coupling.extend(gaps);
+    leaf.base_held = vec![leaf.base_held[0]; 2 * half + usize::from(odd)];
     for mut image in images {
         image.angle = -image.angle;
         for k in [0, 2] {

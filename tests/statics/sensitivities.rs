@@ -498,7 +498,6 @@ fn what_has_no_derivative_is_refused() {
         ("stiffness.axial", "is infinite"),
         ("leaf.rods", "whole number"),
         ("method.step", "setting of a method"),
-        ("leaf.length", "name one of its entries"),
         ("leaf.length[7]", "count from 0"),
         ("dynamics.duration", "write it there first"),
         ("stiffness.torsion+stiffness.bending_2", "another value"),

@@ -1,8 +1,8 @@
 //! Where a motion starts, or starts anew because velocities jumped: as a mass lands, or as the supports of rigid rods
 //! are struck.
 //!
-//! Forces and accelerations are those of the positions and velocities. Of rigid segments they do not follow from strains,
-//! but from a short step, and velocities are the nearest ones with which these segments keep their lengths: impulses in
+//! Forces and accelerations are those of the positions and velocities. Of rigid segments and tissue they do not follow from
+//! strains, but from a short step, and velocities are the nearest ones with which these keep their lengths: impulses in
 //! them act in no time.
 
 use crate::leaf::{DiscreteLeaf, State};
@@ -18,7 +18,7 @@ use crate::rotation;
 use glam::{DMat3, DQuat, DVec3};
 
 /// A first step from rest, of implicit Euler, so short that the leaf hardly moves. It determines the
-/// forces in rigid segments, which do not follow from strains.
+/// forces in rigid segments and tissue, which do not follow from strains.
 struct FirstStepSettings {
     /// Inverse square of the length of the step.
     inverse_square: f64,
@@ -47,7 +47,8 @@ impl SemiImplicit {
     pub(super) fn initialize(&mut self) {
         self.apply_loads_and_damping(0.0, 0.0, FIRST_STEP.inverse_square);
         let violation = self.leaf.strain_forces(&mut self.state);
-        if self.leaf.least_compliance() > 0.0 {
+        let closed = self.leaf.open_tissue_gap(&self.state) < FIRST_STEP.inconsistent_strain;
+        if self.leaf.least_compliance() > 0.0 && !(self.leaf.has_rigid_tissue() && closed) {
             return self.set_accelerations();
         }
         if violation > FIRST_STEP.strain_rounding {
@@ -66,7 +67,7 @@ impl SemiImplicit {
         }
         match self.first_step() {
             true => {
-                std::mem::swap(&mut self.state.n, &mut self.trial.n);
+                self.take_forces_of_trial();
                 for k in 0..self.state.x.len() {
                     let w = self.increment(k).map(|d| FIRST_STEP.inverse_square * d);
                     self.node_motions[k] = NodeMotion::at_rest(w);
@@ -83,6 +84,12 @@ impl SemiImplicit {
         if let Some(state) = project_constraints(&leaf, &self.state) {
             self.state = state;
         }
+    }
+
+    /// Takes the forces in segments and tissue from the trial: those in rigid ones do not follow from strains.
+    fn take_forces_of_trial(&mut self) {
+        std::mem::swap(&mut self.state.n, &mut self.trial.n);
+        std::mem::swap(&mut self.state.tissue, &mut self.trial.tissue);
     }
 
     /// A first step, into the trial; false if it failed.
@@ -285,13 +292,13 @@ impl SemiImplicit {
         } else {
             self.apply_loads_and_damping(self.clock.time, 0.0, FIRST_STEP.inverse_square);
         }
-        if self.leaf.least_compliance() > 0.0 {
+        if self.leaf.least_compliance() > 0.0 && !self.leaf.has_rigid_tissue() {
             self.leaf.strain_forces(&mut self.state);
             self.set_accelerations();
         } else {
             let h = (2.0 / FIRST_STEP.inverse_square).sqrt();
             if self.short_step(FIRST_STEP.inverse_square, h) {
-                std::mem::swap(&mut self.state.n, &mut self.trial.n);
+                self.take_forces_of_trial();
                 for k in 0..self.state.x.len() {
                     let (d, v) = (self.increment(k), self.node_motions[k].v);
                     let w = [0, 1].map(|c| FIRST_STEP.inverse_square * (d[c] - h * v[c]));

@@ -4,7 +4,7 @@
 use crate::scenario::format::entries::{Entries, WrittenEntry};
 use crate::scenario::format::error::{ScenarioError, ScenarioResult, shorten_excerpt};
 use crate::scenario::format::path::EntryPath;
-use crate::scenario::format::places::SAME_PLACE_DISTANCE;
+use crate::scenario::format::places::{ON_BASE, SAME_PLACE_DISTANCE};
 use crate::scenario::format::source::{intended_number, number_of_value};
 use crate::scenario::format::{Key, MissingKeyRule, NumberRange, TablePath, ValueSchema};
 use crate::scenario::profile::Profile;
@@ -715,14 +715,25 @@ impl<'e> EntryValue<'e> {
         Ok([read(moved)?, read(turned)?])
     }
 
-    /// A place along a rod: a fraction of its length, greater than 0.
+    /// A place along a rod: a fraction of its length, greater than 0. One that is meant to be the base is read as
+    /// [`ON_BASE`]: what acts there acts on the base.
     pub fn fraction(&self) -> ScenarioResult<f64> {
+        Ok(self.common_fraction()?.max(ON_BASE))
+    }
+
+    /// A place along a rod as it is read: 0 if it is meant to be the base.
+    fn common_fraction(&self) -> ScenarioResult<f64> {
         let at = self.number_in(NumberRange::Finite)?;
         self.refuse_unless(
             at > 0.0 && at <= 1.0,
             "must be greater than 0 (the base) and at most 1 (the tip): a fraction of the length",
         )?;
-        let at = self.entries.common_place(at);
+        Ok(self.entries.common_place(at))
+    }
+
+    /// A place that is held along a rod, which the base is already.
+    fn held_fraction(&self) -> ScenarioResult<f64> {
+        let at = self.common_fraction()?;
         self.refuse_unless(
             at > 0.0,
             format_args!(
@@ -735,11 +746,11 @@ impl<'e> EntryValue<'e> {
     /// A stretch of a rod, `[from, to]`, or one point of it.
     pub fn fraction_interval(&self) -> ScenarioResult<[f64; 2]> {
         if number_of_value(self.value).is_some() {
-            return Ok([self.fraction()?; 2]);
+            return Ok([self.held_fraction()?; 2]);
         }
         let needed = "a fraction of the length, or a list [from, to] of two";
         let mut ends = self.list_of_length(2, "where the stretch begins and ends", needed)?;
-        let mut next = || ends.next().map_or(Ok(0.0), |item| item.fraction());
+        let mut next = || ends.next().map_or(Ok(0.0), |item| item.held_fraction());
         let [from, to] = [next()?, next()?];
         let written = [0, 1].map(|k| self.entry(k).number().unwrap_or(f64::NAN));
         self.refuse_unless(

@@ -18,6 +18,9 @@ use crate::scenario::format::{Key, ValueSchema};
 /// the equations is at 1e-9.
 pub(crate) const SAME_PLACE_DISTANCE: f64 = 1e-6;
 
+/// The place of what acts on the base: so near to it that a grid has no node of its own there.
+pub(super) const ON_BASE: f64 = 1e-13;
+
 /// The places along the veins that a scenario names, where some of them are so close that they are one.
 #[derive(Clone, Debug)]
 pub(in crate::scenario) struct CommonPlaces {
@@ -44,14 +47,15 @@ impl CommonPlaces {
             let values = entries
                 .paths_of_key(key)
                 .filter_map(|it| entries.value_at(it));
+            let is_place = matches!(key, Key::PointAt | Key::GripAt);
             for value in values {
-                let value = value.get("at").unwrap_or(value);
-                let numbers = value
-                    .as_array()
-                    .map_or(std::slice::from_ref(value), Vec::as_slice);
-                if value.is_array() || matches!(key, Key::PointAt | Key::GripAt) {
-                    all.extend(numbers.iter().filter_map(number_of_value));
-                }
+                // One profile for all veins, or a list of one for each; numbers without knots name no place.
+                let each = one_or_all(value).iter().filter_map(|it| match is_place {
+                    true => Some(it),
+                    false => it.get("at"),
+                });
+                let numbers = each.flat_map(one_or_all);
+                all.extend(numbers.filter_map(number_of_value));
             }
         }
         CommonPlaces::of_places(all)
@@ -99,6 +103,13 @@ impl CommonPlaces {
     }
 }
 
+/// The values of a list, or the value that is none.
+fn one_or_all(value: &toml::Value) -> &[toml::Value] {
+    value
+        .as_array()
+        .map_or(std::slice::from_ref(value), Vec::as_slice)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -117,5 +128,21 @@ mod tests {
         let common = CommonPlaces::of_places(chain.to_vec()).unwrap();
         assert_eq!(common.places, [0.0, 0.5, 0.5 + 1.4e-6, 1.0]);
         assert!(CommonPlaces::of_places(vec![0.0, 0.3, 0.30001, 1.0, 1.0]).is_none());
+    }
+
+    /// Numbers of single veins are no places; knots of single veins are.
+    #[test]
+    fn numbers_without_knots_name_no_place() {
+        let leaf = |bending: &str| {
+            let text = format!(
+                "name = 'leaf'\nleaf = {{ rods = 2, length = 1.0, fan = 'symmetric' }}\n\
+                 stiffness = {{ torsion = 1e-6, bending_2 = {bending}, bending_3 = [0.5, 0.5000001] }}"
+            );
+            let entries = Entries::from_text(&text, "leaf").unwrap();
+            CommonPlaces::of_entries(&entries).map(|it| it.places)
+        };
+        assert_eq!(leaf("[1e-7, 0.5]"), None);
+        let knots = "[0.5, { at = [0.0, 0.5, 0.5000002, 1.0], value = [1.0, 2.0, 3.0, 2.0] }]";
+        assert_eq!(leaf(knots), Some(vec![0.0, 0.5, 1.0]));
     }
 }

@@ -805,6 +805,6 @@ mod tests {
         assert!(!together.contains("axial"), "{together}");
         assert_eq!(said(&[(a, 1.0), (b, -0.002)]), format!("{a}: not at all"));
         let ratio = said(&[(a, 1.0), (b, 1.0), (c, 0.001)]);
-        assert_eq!(ratio, format!("{a} and {b}: only as their ratio"));
+        assert_eq!(ratio, format!("{a} and {b}: only as their ratio, 1"));
     }
 }
