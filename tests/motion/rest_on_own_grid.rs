@@ -65,3 +65,22 @@ fn what_rests_on_finer_grids_alone_moves_on_them() {
         "{why}"
     );
 }
+
+/// Rigid tissue bears forces that do not follow from where the veins are: a blade that starts at rest has them, too.
+#[test]
+fn blades_stay_at_rest() {
+    for (file, sets) in [
+        ("measured/blade", "leaf.rods=3"),
+        ("measured/blade", "leaf.rods=4; load.g=[0.0, 50.0, -981.0]"),
+        ("measured/blade", "leaf.rods=3; blade.thickness=0.01"),
+        ("study/plate", "leaf.rods=3"),
+    ] {
+        let sets = format!(
+            "{sets}; dynamics.start=\"at-rest\"; dynamics.duration=0.02; dynamics.output_interval=0.01"
+        );
+        let leaf = scenario(file, &sets);
+        let (way, _) = moves(&leaf, &moving(Scheme::SemiImplicit, Some(16))).unwrap();
+        let length = leaf.rods[0].length;
+        assert!(way < 1e-9 * length, "{file}, {sets}: {way:.1e}");
+    }
+}
