@@ -51,7 +51,7 @@ pub fn examples() -> Texts {
         &texts!("scenarios/measured":
             "across" "blade" "clip" "grass" "hanging" "lily" "orchid" "posture" "pull"),
         &texts!("scenarios/field": "bamboo" "palm" "pazy" "wheat"),
-        &texts!("scenarios/motion": "curl" "drop" "gust" "strike" "swing"),
+        &texts!("scenarios/motion": "curl" "drop" "gust" "snap" "strike" "swing"),
         &texts!("scenarios/study": "plate" "saddle" "undulation"),
     ]
     .concat()

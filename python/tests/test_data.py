@@ -140,7 +140,7 @@ def test_a_fit() -> None:
     sets = found.to_xarray()
     assert np.array_equal(sets.value, list(found.values.values()))
     assert np.array_equal(sets.residual, found.residuals)
-    with pytest.raises(ValueError, match="must be data, parameters or correlations"):
+    with pytest.raises(ValueError, match="must be data, parameters, correlations or covariance"):
         found.to_pandas("all")
 
 

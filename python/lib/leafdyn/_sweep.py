@@ -205,7 +205,7 @@ class Kind(NamedTuple):
 
     def unit(self, name: str, units: Mapping[str, str]) -> str | None:
         """Its unit, if it has one with a name."""
-        if self.dimension == (0, 0, 0):
+        if not any(self.dimension):
             return None
         if name.startswith("frequency_") and units.get("time") == "s":
             return "Hz"

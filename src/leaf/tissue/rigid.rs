@@ -57,6 +57,28 @@ impl DiscreteLeaf {
         soft
     }
 
+    /// The strips of the tissue, whatever place they have.
+    pub fn tissue_data(&self) -> &[TissueStrip] {
+        &self.strips
+    }
+
+    /// Sets the stiffness with which forces in rigid tissue are condensed out to that of the leaf's `own` strips or, where
+    /// this is larger, to that of the inertia of the nodes of these numbers: iterations in the steps of a motion
+    /// then converge equally fast for all steps.
+    pub fn condense_rigid_tissue(&mut self, own: &[TissueStrip], inertial: impl Fn(usize) -> f64) {
+        let (nodes, gaps) = (self.segments() + 1, self.rods().saturating_sub(1));
+        for (k, (strip, own)) in self.strips.iter_mut().zip(own).enumerate() {
+            if !own.is_rigid() {
+                continue;
+            }
+            let (gap, node) = (k / nodes % gaps, k % nodes);
+            let [a, b] = [gap, gap + 1].map(|rod| inertial(rod * nodes + node));
+            let rigid = own.stiffness.cmpeq(DVec3::INFINITY);
+            let raised = own.condensing.max(DVec3::splat(a.max(b)));
+            strip.condensing = DVec3::select(rigid, raised, own.condensing);
+        }
+    }
+
     /// The strips of all nodes in a state by their rigid directions; none unless tissue is rigid.
     pub(in crate::leaf) fn rigid_strips(&self, state: &State) -> Vec<RigidStrip> {
         if !self.has_rigid_tissue() {

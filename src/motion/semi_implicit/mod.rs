@@ -32,7 +32,7 @@ use crate::motion::{
 };
 use crate::newton::{DefiniteSolver, SolverCounts};
 use crate::numbers::larger;
-use crate::rod::{Section, Wrench};
+use crate::rod::{Section, TissueStrip, Wrench};
 use crate::rotation;
 use glam::{DMat3, DVec3};
 
@@ -66,7 +66,7 @@ struct SemiImplicitSettings {
     count_only_cg_accuracy: f64,
     /// Largest rotation of a node in a step, radians.
     largest_rotation: f64,
-    /// The stiffness with which the forces of rigid segments are condensed out is
+    /// The stiffness with which the forces of rigid segments and tissue are condensed out is
     /// at least this multiple of the resistance of inertia: iterations then converge
     /// equally fast for all steps.
     condensing_ratio: f64,
@@ -170,8 +170,9 @@ pub struct SemiImplicit {
     inertia: Vec<Inertia>,
     wind: Option<WindDrag>,
     supports: Option<MovingSupports>,
-    /// The rods' own sections, if internal damping changes them.
+    /// The rods' own sections, if internal damping changes them, and the leaf's own strips of tissue.
     sections: Vec<Section>,
+    strips: Vec<TissueStrip>,
     /// Strains (v, u) of all segments at the last step and the one before.
     strain_history: [Vec<[DVec3; 2]>; 2],
     /// Length of the last step; zero if there was none.
@@ -213,6 +214,7 @@ impl SemiImplicit {
             wind: WindDrag::new(&leaf, &physics),
             supports: MovingSupports::new(&leaf, &physics),
             sections: leaf.sections.clone(),
+            strips: leaf.tissue_data().to_vec(),
             strain_history: [Vec::new(), Vec::new()],
             past_step: 0.0,
             friction_power: 0.0,
@@ -715,6 +717,8 @@ impl SemiImplicit {
             let condensing = (stiffer * own.condensing).max(inertial);
             section.condensing = condensing.min(section.compliance.recip());
         }
+        let inertial = |node: usize| SETTINGS.condensing_ratio * per_mass * self.inertia[node].mass;
+        (self.leaf).condense_rigid_tissue(&self.strips, inertial);
     }
 }
 
