@@ -197,9 +197,36 @@ impl Entries {
     /// These entries with close places along the veins made one.
     pub(in crate::scenario) fn with_common_places(&self) -> Self {
         Entries {
-            common_places: CommonPlaces::of_entries(self).map(Arc::new),
+            common_places: CommonPlaces::of_places(self.written_places()).map(Arc::new),
             ..self.clone()
         }
+    }
+
+    /// All places along the veins that are written, and both ends of the veins.
+    fn written_places(&self) -> Vec<f64> {
+        let mut all = vec![0.0, 1.0];
+        for key in Key::all() {
+            let is_place = matches!(key, Key::PointAt | Key::GripAt);
+            let is_profile = match key.form() {
+                // Fractions of a blade are not those of its veins.
+                ValueSchema::Quantity(_) | ValueSchema::VectorQuantity(_) => key.table() != "blade",
+                _ => false,
+            };
+            if !is_place && !is_profile {
+                continue;
+            }
+            let values = self.paths_of_key(key).filter_map(|it| self.value_at(it));
+            for value in values {
+                // One profile for all veins, or a list of one for each; numbers without knots name no place.
+                let each = one_or_all(value).iter().filter_map(|it| match is_place {
+                    true => Some(it),
+                    false => it.get("at"),
+                });
+                let numbers = each.flat_map(one_or_all);
+                all.extend(numbers.filter_map(number_of_value));
+            }
+        }
+        all
     }
 
     /// What a place along a vein is read as.
@@ -485,4 +512,11 @@ fn inner_table<'d>(
             inner.or_insert_with(rows).get_mut(row)?.as_table_mut()
         }
     }
+}
+
+/// The values of a list, or the value that is none.
+fn one_or_all(value: &Value) -> &[Value] {
+    value
+        .as_array()
+        .map_or(std::slice::from_ref(value), Vec::as_slice)
 }

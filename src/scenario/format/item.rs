@@ -410,11 +410,10 @@ impl<'e> EntryValue<'e> {
             let between = ends[0].min(ends[1])..=ends[0].max(ends[1]);
             let beyond = (first..=last).find(|&k| !between.contains(&value[k]));
             if let Some(beyond) = beyond {
-                let problem = format_args!(
+                return Err(self.entry(beyond).value_error(format_args!(
                     "is reached and left within {SAME_PLACE_DISTANCE:e} of the length, which is one place: give the \
                      stretch that has this value more length"
-                );
-                return Err(self.entry(beyond).value_error(problem));
+                )));
             }
             // A step at an end of the vein has one side.
             let sides = match at[first] {

@@ -6,10 +6,6 @@
 //! digits that the equilibrium needs. So all places are compared before a scenario is read, and those that
 //! close are read as one.
 
-use crate::scenario::format::entries::Entries;
-use crate::scenario::format::source::number_of_value;
-use crate::scenario::format::{Key, ValueSchema};
-
 /// Largest difference of fractions of the length that are one place.
 ///
 /// A knot that moves by it moves a leaf by a few tenths of it: 1.2e-7 to 1.7e-7 of the length where stiffnesses, rest
@@ -31,37 +27,9 @@ pub(in crate::scenario) struct CommonPlaces {
 }
 
 impl CommonPlaces {
-    /// The common places of all that the entries name. `None` if no two are close and yet different: then all are read
-    /// as they are written.
-    pub fn of_entries(entries: &Entries) -> Option<CommonPlaces> {
-        let mut all = vec![0.0, 1.0];
-        for key in Key::all() {
-            let has_places = match key.form() {
-                // Fractions of a blade are not those of its veins.
-                ValueSchema::Quantity(_) | ValueSchema::VectorQuantity(_) => key.table() != "blade",
-                _ => matches!(key, Key::PointAt | Key::GripAt),
-            };
-            if !has_places {
-                continue;
-            }
-            let values = entries
-                .paths_of_key(key)
-                .filter_map(|it| entries.value_at(it));
-            let is_place = matches!(key, Key::PointAt | Key::GripAt);
-            for value in values {
-                // One profile for all veins, or a list of one for each; numbers without knots name no place.
-                let each = one_or_all(value).iter().filter_map(|it| match is_place {
-                    true => Some(it),
-                    false => it.get("at"),
-                });
-                let numbers = each.flat_map(one_or_all);
-                all.extend(numbers.filter_map(number_of_value));
-            }
-        }
-        CommonPlaces::of_places(all)
-    }
-
-    fn of_places(mut all: Vec<f64>) -> Option<CommonPlaces> {
+    /// The common places of all these. `None` if no two are close and yet different: then all are read as they are
+    /// written.
+    pub(super) fn of_places(mut all: Vec<f64>) -> Option<CommonPlaces> {
         all.retain(|at| (0.0..=1.0).contains(at));
         all.sort_by(f64::total_cmp);
         all.dedup();
@@ -103,13 +71,6 @@ impl CommonPlaces {
     }
 }
 
-/// The values of a list, or the value that is none.
-fn one_or_all(value: &toml::Value) -> &[toml::Value] {
-    value
-        .as_array()
-        .map_or(std::slice::from_ref(value), Vec::as_slice)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -128,21 +89,5 @@ mod tests {
         let common = CommonPlaces::of_places(chain.to_vec()).unwrap();
         assert_eq!(common.places, [0.0, 0.5, 0.5 + 1.4e-6, 1.0]);
         assert!(CommonPlaces::of_places(vec![0.0, 0.3, 0.30001, 1.0, 1.0]).is_none());
-    }
-
-    /// Numbers of single veins are no places; knots of single veins are.
-    #[test]
-    fn numbers_without_knots_name_no_place() {
-        let leaf = |bending: &str| {
-            let text = format!(
-                "name = 'leaf'\nleaf = {{ rods = 2, length = 1.0, fan = 'symmetric' }}\n\
-                 stiffness = {{ torsion = 1e-6, bending_2 = {bending}, bending_3 = [0.5, 0.5000001] }}"
-            );
-            let entries = Entries::from_text(&text, "leaf").unwrap();
-            CommonPlaces::of_entries(&entries).map(|it| it.places)
-        };
-        assert_eq!(leaf("[1e-7, 0.5]"), None);
-        let knots = "[0.5, { at = [0.0, 0.5, 0.5000002, 1.0], value = [1.0, 2.0, 3.0, 2.0] }]";
-        assert_eq!(leaf(knots), Some(vec![0.0, 0.5, 1.0]));
     }
 }

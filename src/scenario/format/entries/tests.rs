@@ -93,3 +93,20 @@ fn slips_are_explained() {
         assert!(message.len() < 300, "{message}");
     }
 }
+
+/// Numbers of single veins are no places; knots of single veins are.
+#[test]
+fn numbers_without_knots_name_no_place() {
+    let leaf = |bending: &str| {
+        let text = format!(
+            "name = 'leaf'\nleaf = {{ rods = 2, length = 1.0, fan = 'symmetric' }}\n\
+             stiffness = {{ torsion = 1e-6, bending_2 = {bending}, bending_3 = [0.5, 0.5000001] }}"
+        );
+        let entries = Entries::from_text(&text, "leaf").unwrap();
+        CommonPlaces::of_places(entries.written_places())
+            .map(|it| [0.0, 0.5, 0.5000002, 1.0].map(|at| it.common_place(at)))
+    };
+    assert_eq!(leaf("[1e-7, 0.5]"), None);
+    let knots = "[0.5, { at = [0.0, 0.5, 0.5000002, 1.0], value = [1.0, 2.0, 3.0, 2.0] }]";
+    assert_eq!(leaf(knots), Some([0.0, 0.5, 0.5, 1.0]));
+}
