@@ -17,7 +17,7 @@ from ._result import Contents, Table, read_only
 from ._view import Viewed
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
     from xarray import Dataset
 
 
@@ -165,7 +165,7 @@ class Branch:
         ends = [*begins[1:], len(steps)]
         return [Piece(bool(steps[begin]), slice(int(begin), int(end) + 1)) for begin, end in zip(begins, ends)]
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """Its `columns` as a ``pandas.DataFrame``."""
         return table(self.columns, self._units, {}, value=self.key)
 
@@ -321,7 +321,7 @@ class Curve:
         """The Morse index before and behind each point along the first number, shape (P, 2)."""
         return np.stack([self.columns["index_before"], self.columns["index_behind"]], axis=1)
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """Its `columns` as a ``pandas.DataFrame``."""
         return table(self.columns, self._units, {})
 

@@ -23,7 +23,7 @@ from ._sweep import quantity
 from ._traced import POINTS, draw_points, draw_rows
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
     from xarray import Dataset
 
 
@@ -141,7 +141,7 @@ class LikelihoodProfile:
     values: Array
     chi_squared: Array
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each value."""
         return pandas().DataFrame({self.key: self.values, "chi_squared": self.chi_squared})
 
@@ -245,7 +245,7 @@ class Fit(Table):
         """The scenario with the values in place, as ``fitted.toml``."""
         return Scenario(self._files.contents("fitted.toml").decode())
 
-    def to_pandas(self, table: str = "data") -> DataFrame:
+    def to_pandas(self, table: str = "data") -> _DataFrame:
         """One of its tables as a ``pandas.DataFrame``.
 
         Parameters

@@ -19,7 +19,7 @@ from ._surface import Angles, Mesh, angles, mesh
 from ._view import Viewed
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
     from xarray import Dataset
 
     from ._scenario import Scenario
@@ -332,7 +332,7 @@ class Equilibrium(Viewed):
         found = {name: getattr(self, name, None) for name in QUANTITIES}
         return {name: array for name, array in found.items() if array is not None}
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``rod``, counted from 1, and ``station``, a fraction of the length:
         the numbers and columns of ``centerlines.csv``.
 

@@ -18,7 +18,7 @@ from ._result import KINDS, chosen, kind
 from ._view import Viewed
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
     from xarray import Dataset
 
 ENERGIES = ("kinetic", "elastic", "coupling", "potential", "dissipated", "work")
@@ -109,7 +109,7 @@ class Motion(Viewed):
     def _nodes(self) -> dict[str, Array]:
         return {name: getattr(self, name) for name in QUANTITIES if name in self.__dict__}
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``time``, ``rod``, counted from 1, and ``station``: the numbers and
         columns of ``motion.csv``. The `energies` are a table of their own: ``pandas.DataFrame(energies, times)``.
 

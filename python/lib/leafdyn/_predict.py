@@ -18,7 +18,7 @@ from ._sensitivity import Sensitivity
 from ._sweep import quantity
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ class Prediction:
     leaves: list[Equilibrium]
     _units: Mapping[str, str] = field(default_factory=dict, repr=False)
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each condition: the numbers that were set, what is predicted, and its
         bands as ``"tip_x_band"``."""
         found: dict[str, Array] = {}

@@ -18,7 +18,7 @@ from . import _leafdyn
 from ._data import column_variables, dataset, table
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
     from xarray import Dataset
 
 KINDS = ("json", "csv", "svg", "png")
@@ -167,7 +167,7 @@ class Table(Result):
         """The key of which its column ``value`` is."""
         return "value"
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """Its table as a ``pandas.DataFrame``; ``attrs["units"]`` has the units that the scenario names, by columns."""
         return table(self.columns, self._units, self._attrs, value=self._value)
 

@@ -16,7 +16,7 @@ from ._result import Contents, Result, Table
 from ._view import Viewed
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
     from xarray import Dataset
 
 
@@ -86,7 +86,7 @@ class Equilibria(Viewed, Sequence[Equilibrium]):
     def __iter__(self) -> Iterator[Equilibrium]:
         return iter(self._leaves)
 
-    def to_pandas(self) -> DataFrame:
+    def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``equilibrium``, counted from 0, ``rod`` and ``station``."""
         leaves = {number: leaf.to_pandas() for number, leaf in enumerate(self)}
         if not leaves:

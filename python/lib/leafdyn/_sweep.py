@@ -21,7 +21,7 @@ from ._relax import asked_for, relaxed, tells_refusals, warn
 from ._scenario import Scenario, Source, checked
 
 if TYPE_CHECKING:
-    from pandas import DataFrame
+    from pandas import DataFrame as _DataFrame
 
 Of = Callable[[Equilibrium], Any]
 """What is wanted of a leaf."""
@@ -59,7 +59,7 @@ def sweep(
     time_limit: float | None = None,
     client: Any = None,
     progress: Progress = None,
-) -> DataFrame:
+) -> _DataFrame:
     """Find how a leaf comes to rest over all combinations of some numbers of its scenario, on all cores.
 
     Parameters that are not listed are those of `relax`.
