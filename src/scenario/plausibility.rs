@@ -181,7 +181,7 @@ remarks! {
         } = "denser-than-anything",
         /// A material stiffer than any.
         #[error(
-            "{key} is {} GPa in the units of the scenario, and diamond, the stiffest material, has 1200; check it and its unit: with lengths in {length} and forces in {force}, 1 GPa is {}",
+            "{key} is {} GPa in the units of the scenario, and diamond, the stiffest material, has 1220; check it and its unit: with lengths in {length} and forces in {force}, 1 GPa is {}",
             four_digits(1e-9 * .young), four_digits(*.gigapascal)
         )]
         StifferThanDiamond {
