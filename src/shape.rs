@@ -137,6 +137,12 @@ impl InterpolationWeights {
         let near = nodes[self.first..].iter().zip(&self.weights);
         near.map(|(node, weight)| *weight * of(node)).sum()
     }
+
+    /// The interpolated rotation of the directors.
+    pub fn rotation(&self, nodes: &[NodeState]) -> DQuat {
+        let near = nodes[self.first..].iter().zip(&self.weights);
+        rotation::interpolated_rotation(near.map(|(node, weight)| (node.rotation, *weight)))
+    }
 }
 
 /// Interpolation at `at` by the polynomial through `count` neighboring `nodes`.

@@ -5,6 +5,7 @@ use crate::leaf::{DiscreteLeaf, RodFields, RodIntegrator, StationFields};
 use crate::numbers::larger;
 use crate::relax::accuracy::richardson::{Richardson, distance};
 use crate::relax::accuracy::transfer::{GridLevel, NodalResultants, Stencil, positions};
+use crate::rotation::align_quaternion_sign;
 use glam::{DQuat, DVec3};
 
 /// A node's values that are extrapolated: position, quaternion, n and m along the directors.
@@ -249,11 +250,6 @@ fn rotations(level: &GridLevel, j: usize) -> Vec<DQuat> {
     };
     let rotations = level.state.q[base..=base + level.leaf.segments()].iter();
     rotations.map(same).collect()
-}
-
-/// The quaternion q or -q, which are the same rotation: the one nearer to `other`.
-pub fn align_quaternion_sign(q: DQuat, other: DQuat) -> DQuat {
-    if q.dot(other) < 0.0 { -q } else { q }
 }
 
 /// Longest step of the integration between stations, as a fraction of the length. Half of it doubles

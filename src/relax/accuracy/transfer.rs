@@ -6,7 +6,7 @@ use crate::leaf::{
     ContractionResultants, DiscreteLeaf, Grid, Leaf, NodeLoad, RodFields, State, whole_state,
 };
 use crate::rod::SegmentGradient;
-use crate::rotation;
+use crate::rotation::{self, interpolated_rotation};
 use crate::shape::{NodeState, RodShape};
 use glam::{DQuat, DVec3};
 
@@ -375,17 +375,9 @@ impl<const MOST: usize> Stencil<MOST> {
         self.terms().map(|(i, weight)| weight * at(i)).sum()
     }
 
-    /// The interpolated rotation, of quaternions with signs that are continuous from node to node: neighbours
-    /// differ by less than half a turn, more distant nodes may not.
+    /// The interpolated rotation.
     pub fn rotation(&self, at: impl Fn(usize) -> DQuat) -> DQuat {
-        let mut before = at(self.first);
-        let mut sum = DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0);
-        for (i, weight) in self.terms() {
-            let q = at(i);
-            before = if q.dot(before) < 0.0 { -q } else { q };
-            sum += before * weight;
-        }
-        sum.normalize()
+        interpolated_rotation(self.terms().map(|(i, weight)| (at(i), weight)))
     }
 
     /// The stencil of the value at a fraction of the length between two kinks through nodes after the first

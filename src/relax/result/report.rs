@@ -6,7 +6,7 @@ use crate::natural::Natural;
 use crate::newton::EquilibriumFailure;
 use crate::numbers::larger;
 use crate::relax::accuracy::fields::{
-    KnownResultants, KnownSection, LeafSection, align_quaternion_sign, integrate_between_stations,
+    KnownResultants, KnownSection, LeafSection, integrate_between_stations,
 };
 use crate::relax::accuracy::transfer::{GridLevel, NodalResultants, VeinStation, is_planar_level};
 use crate::relax::accuracy::{IntegratedLeaf, NestedEquilibrium, transfer};
@@ -15,7 +15,7 @@ use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
 use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
-use crate::rotation::Pose;
+use crate::rotation::{Pose, align_quaternion_sign};
 use crate::scenario::{
     Grip, LARGEST_PLAUSIBLE_STRETCH, Scenario, Tissue, held_tip_out_of_reach,
     plausibility_warnings, probable_obstacle_to_rest,
@@ -790,17 +790,11 @@ impl StationInterpolation {
 
     /// The state of a vein with these nodes.
     fn node_state(&self, nodes: &[NodeState]) -> NodeState {
-        let InterpolationWeights { first, weights } = &self.value;
-        let near = || nodes[*first..].iter().zip(weights);
         let sum = |of: fn(&NodeState) -> DVec3| self.value.weighted_sum(nodes, of);
         let strain = |of: fn(&NodeState) -> DVec3| self.strains.weighted_sum(nodes, of);
-        let sign = nodes[*first].rotation;
-        let turned =
-            near().map(|(node, weight)| align_quaternion_sign(node.rotation, sign) * *weight);
-        let rotation = turned.reduce(|a, b| a + b).unwrap_or(sign);
         NodeState {
             position: sum(|node| node.position),
-            rotation: rotation.normalize(),
+            rotation: self.value.rotation(nodes),
             v: strain(|node| node.v),
             u: strain(|node| node.u),
             n: sum(|node| node.n),

@@ -16,7 +16,7 @@ use crate::figure::scenario::FigureSetting;
 use crate::figure::shaded::light::{LightSubset, Lighting, SUN_SHARE, SpaceTriangle, SurfaceLight};
 use crate::figure::shaded::raster::{CornerWeights, NearestTriangles, ProjectedTriangle};
 use crate::report::numbers::format_four_digits;
-use glam::{DQuat, DVec2, DVec3, DVec4};
+use glam::{DQuat, DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Shape};
 use leafdyn::scenario::Scenario;
 use leafdyn::shape::{InterpolationWeights, NodeState, RodShape, interpolation_weights};
@@ -216,20 +216,10 @@ fn finely_divided(shape: &Shape) -> Shape {
 
 /// A node between those of a rod: its place and its directors.
 fn interpolated(rod: &RodShape, weights: &InterpolationWeights) -> NodeState {
-    let nodes = &rod.nodes[weights.first..];
-    let near = &nodes[0];
-    let rotations = nodes.iter().zip(&weights.weights).map(|(node, weight)| {
-        // The same rotation has two quaternions.
-        let side = near.rotation.dot(node.rotation).signum();
-        DVec4::from(node.rotation) * (side * weight)
-    });
-    let rotation = rotations
-        .sum::<DVec4>()
-        .normalize_or(DVec4::from(near.rotation));
     NodeState {
         position: weights.weighted_sum(&rod.nodes, |node| node.position),
-        rotation: DQuat::from_vec4(rotation),
-        ..*near
+        rotation: weights.rotation(&rod.nodes),
+        ..rod.nodes[weights.first]
     }
 }
 
