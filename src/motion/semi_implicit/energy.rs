@@ -121,11 +121,18 @@ impl SemiImplicit {
         if !self.leaf.has_followers() {
             return 0.0;
         }
-        let (from, to) = (self.clock.time, self.clock.time + h);
-        self.physics.apply_loads(&mut self.leaf, from);
+        // The leaf has the loads at the end of the step.
+        let after = self.follower_work(&self.state);
+        let varies = self.leaf.leaf.scenario().has_followers_in_time();
+        if varies {
+            self.physics.apply_loads(&mut self.leaf, self.clock.time);
+        }
         let before = self.follower_work(&self.trial);
-        self.physics.apply_loads(&mut self.leaf, to);
-        0.5 * (before + self.follower_work(&self.state))
+        if varies {
+            self.physics
+                .apply_loads(&mut self.leaf, self.clock.time + h);
+        }
+        0.5 * (before + after)
     }
 
     /// The work that the present loads without a potential, as they are turned in a state, would do in the accepted

@@ -585,64 +585,52 @@ impl SemiImplicit {
         };
         let (n, rods) = (self.leaf.segments(), self.leaf.rods());
         let together = self.leaf.tips_move_together();
-        for it in &scheduled.forces {
-            let change = self.factor_changes[it.factor] * it.force;
-            let on_joint_tip = together && it.node == n;
-            let nodes = match on_joint_tip {
-                true => 0..rods,
-                false => it.rod..it.rod + 1,
-            };
-            let mass: f64 = { nodes.clone() }
-                .map(|j| self.inertia[self.state.base(j) + it.node].mass)
-                .sum();
-            if self.is_off_axis_body(self.state.base(it.rod) + it.node) {
-                continue;
-            }
-            for j in nodes {
-                let free = self.leaf.node_freedom(j, it.node);
-                let linear = free.of_displacement(change / mass);
-                self.node_motions[self.state.base(j) + it.node].a[1] += linear;
-            }
-        }
-        for (number, lever) in &scheduled.levers {
-            let k = self.state.base(lever.rod) + lever.node;
-            let free = self.leaf.node_freedom(lever.rod, lever.node);
-            if free.rotation && !self.is_off_axis_body(k) {
-                let tensor = self.inertia[k].tensor(self.state.q[k]);
-                let change = self.factor_changes[*number] * lever.moment(self.state.q[k]);
-                self.node_motions[k].a[0] += tensor.inverse() * change;
-            }
-        }
-        for (number, NodalMoment { node, moment }) in &scheduled.moments {
-            let free = self.leaf.node_freedom(0, *node);
-            if free.rotation && !self.is_off_axis_body(*node) {
-                let tensor = self.inertia[*node].tensor(self.state.q[*node]);
-                let change = self.factor_changes[*number] * *moment;
-                self.node_motions[*node].a[0] += tensor.inverse() * change;
-            }
-        }
-        for it in &scheduled.followers {
-            let k = self.state.base(it.rod) + it.node;
+        let (q, factors) = (&self.state.q, &self.factor_changes);
+        let rotation = |rod: usize, node: usize| q[rod * (n + 1) + node];
+        let of_moment = |moment: DVec3| Wrench {
+            moment,
+            ..Wrench::default()
+        };
+        let forces = scheduled.forces.iter().map(|it| {
+            let change = Wrench::from_force(factors[it.factor] * it.force);
+            (it.rod, it.node, change)
+        });
+        let levers = scheduled.levers.iter().map(|(number, lever)| {
+            let moment = lever.moment(rotation(lever.rod, lever.node));
+            (lever.rod, lever.node, of_moment(factors[*number] * moment))
+        });
+        let moments = scheduled
+            .moments
+            .iter()
+            .map(|(number, it)| (0, it.node, of_moment(factors[*number] * it.moment)));
+        let followers = scheduled.followers.iter().map(|it| {
+            let turned = (it.load * factors[it.factor]).wrench(rotation(it.rod, it.node));
+            (it.rod, it.node, turned)
+        });
+        for (rod, node, change) in forces.chain(levers).chain(moments).chain(followers) {
+            let k = self.state.base(rod) + node;
             if self.is_off_axis_body(k) {
                 continue;
             }
-            let q = self.state.q[k];
-            let change = (it.load * self.factor_changes[it.factor]).wrench(q);
-            if self.leaf.node_freedom(it.rod, it.node).rotation {
-                let tensor = self.inertia[k].tensor(q);
+            if change.moment != DVec3::ZERO && self.leaf.node_freedom(rod, node).rotation {
+                let tensor = self.inertia[k].tensor(self.state.q[k]);
                 self.node_motions[k].a[0] += tensor.inverse() * change.moment;
             }
-            let nodes = match together && it.node == n {
+            if change.force == DVec3::ZERO {
+                continue;
+            }
+            // A joint tip moves as a whole.
+            let sharing = match together && node == n {
                 true => 0..rods,
-                false => it.rod..it.rod + 1,
+                false => rod..rod + 1,
             };
-            let mass: f64 = { nodes.clone() }
-                .map(|j| self.inertia[self.state.base(j) + it.node].mass)
+            let mass: f64 = { sharing.clone() }
+                .map(|j| self.inertia[self.state.base(j) + node].mass)
                 .sum();
-            for j in nodes {
-                let free = self.leaf.node_freedom(j, it.node);
+            for j in sharing {
+                let free = self.leaf.node_freedom(j, node);
                 let linear = free.of_displacement(change.force / mass);
-                self.node_motions[self.state.base(j) + it.node].a[1] += linear;
+                self.node_motions[self.state.base(j) + node].a[1] += linear;
             }
         }
     }
