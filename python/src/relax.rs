@@ -287,8 +287,9 @@ pub fn relax_one(
         })?;
         found.map_err(value_error)?
     } else {
-        let keys: Result<Vec<ParameterKeys>, _> =
-            asked.sensitivity.iter().map(|key| key.parse()).collect();
+        let keys: Result<Vec<ParameterKeys>, _> = (asked.sensitivity.iter())
+            .map(|key| ParameterKeys::parse_with_vectors(key))
+            .collect();
         let keys = keys.map_err(|error| vary_error(py, error))?;
         let base = scenario.base(py)?;
         let found = run(py, progress, move |monitor| {

@@ -162,15 +162,22 @@ impl DiscreteLeaf {
         discrete.scheduled_loads = discrete.find_scheduled_loads();
         discrete.followers = discrete.nodal_followers();
         if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
-            let natural = discrete.stress_free_state();
+            // Holders and tissue have their places in the natural leaf, whatever the rest shapes are now.
+            let original = (leaf.scenario().natural.as_deref())
+                .map(|natural| DiscreteLeaf::new(&Leaf::new(natural), discrete.grid.clone()));
+            let unstrained = |grown: bool| {
+                original
+                    .as_ref()
+                    .unwrap_or(&discrete)
+                    .unstrained_state(grown)
+            };
+            let (natural, grown) = (unstrained(true), leaf.scenario().tissue_grown);
+            let ungrown = (leaf.has_tissue() && !grown).then(|| unstrained(false));
             discrete.set_gripped_nodes(&natural);
             discrete.limit_held_segments();
             discrete.springs = discrete.springs_from(&natural);
             if leaf.has_tissue() {
-                discrete.strips = match leaf.scenario().tissue_grown {
-                    true => discrete.tissue_strips(&natural),
-                    false => discrete.tissue_strips(&discrete.unstrained_state(false)),
-                };
+                discrete.strips = discrete.tissue_strips(ungrown.as_ref().unwrap_or(&natural));
             }
         }
         discrete
@@ -672,7 +679,7 @@ impl Leaf {
         if !self.has_tissue() {
             return;
         }
-        let natural = Natural::new(self.scenario(), true);
+        let natural = Natural::at_rest(self.scenario());
         for (j, sections) in sections.chunks_mut(grid.segments()).enumerate() {
             if self.is_straight_at_rest(j) {
                 continue;

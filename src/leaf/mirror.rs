@@ -37,6 +37,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         grips,
         foundation,
         wind,
+        natural,
         dynamics,
         ..
     } = scenario;
@@ -47,6 +48,7 @@ pub fn is_mirrored(scenario: &Scenario) -> bool {
         .any(Option::is_some)
         || !(points.is_empty() && grips.is_empty())
         || wind.is_some()
+        || natural.is_some()
         || !scenario.all_bases_clamped();
     let weights = |(a, b): (usize, usize)| {
         let [own, image] = [a, b].map(|vein| scenario.weight(vein).even);

@@ -277,7 +277,7 @@ remarks! {
             distance: f64,
         } = "another-equilibrium",
         /// An estimate from very few veins.
-        #[error("it is estimated from {rods} veins, and may be larger")]
+        #[error("what more veins would change is estimated from {rods} veins, and may be larger")]
         VeryFew {
             /// The smaller number of veins.
             rods: usize,

@@ -3,7 +3,7 @@
 
 use crate::run::remarks;
 use crate::scenario::checked::Scenario;
-use crate::scenario::loads::Dynamics;
+use crate::scenario::loads::{Dynamics, PolarInertia};
 use crate::scenario::supports::Clamp;
 use crate::scenario::veins::Rod;
 use glam::DVec3;
@@ -29,6 +29,8 @@ struct PlausibleRanges {
     /// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
     /// a turn that are multiples of this.
     degree_multiple: f64,
+    /// The radius of gyration that is assumed may be larger than that of known sections by this factor.
+    gyration_ratio: f64,
 }
 
 const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
@@ -38,6 +40,7 @@ const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
     weight_contradiction: 10.0,
     weight_tolerance: 0.01,
     degree_multiple: 15.0,
+    gyration_ratio: 2.0,
 };
 
 /// A unit of length, and the acceleration of gravity in it per second squared.
@@ -179,6 +182,26 @@ remarks! {
             /// That of water in the units of the scenario.
             water: f64,
         } = "denser-than-anything",
+        /// A material lighter than air.
+        #[error(
+            "{key} is {} kg/m³ in the units of the scenario, and air has {AIR}: it is mass per volume; divide a mass per area by the thickness",
+            four_digits(*.density)
+        )]
+        LighterThanAir {
+            /// The key of the scenario.
+            key: &'static str,
+            /// Mass per volume, in kg/m³.
+            density: f64,
+        } = "lighter-than-air",
+        /// Inertia of rotation that is assumed although sections are known.
+        #[error(
+            "dynamics.density without dynamics.rotary_inertia: sections turn with the radius of gyration L/10, {} times that of [section]; give section.mass_density in place of dynamics.density, or the rotary inertia, too",
+            four_digits(*.times)
+        )]
+        AssumedRotaryInertia {
+            /// The assumed radius of gyration over the larger one of the section.
+            times: f64,
+        } = "assumed-rotary-inertia",
         /// A material stiffer than any.
         #[error(
             "{key} is {} GPa in the units of the scenario, and diamond, the stiffest material, has 1220; check it and its unit: with lengths in {length} and forces in {force}, 1 GPa is {}",
@@ -274,6 +297,8 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
     ];
     let materials = [
         denser_than_anything(scenario),
+        lighter_than_air(scenario),
+        assumed_rotary_inertia(scenario),
         stiffer_than_diamond(scenario),
     ];
     let all = angles.into_iter().chain(lengths).chain(materials);
@@ -368,7 +393,7 @@ fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
 fn section_wider_than_vein_long(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let side = |j: usize| scenario.radii.largest_side(j).unwrap_or(0.0);
     let mut rods = scenario.rods.iter().enumerate();
-    let (vein, rod) = rods.find(|(j, rod)| side(*j) > rod.length)?;
+    let (vein, rod) = rods.find(|(j, rod)| side(*j) >= rod.length)?;
     Some(PlausibilityWarning::ThickerThanLong {
         vein,
         side: side(vein),
@@ -384,23 +409,43 @@ const LARGEST_YOUNG: f64 = 1.22e12;
 /// Density of water, in kg/m³.
 const WATER: f64 = 1e3;
 
+/// Density of air at sea level, in kg/m³ (International Standard Atmosphere, ISO 2533).
+const AIR: f64 = 1.225;
+
+/// A mass per volume, where units are named.
+struct NamedDensity {
+    key: &'static str,
+    /// In the units of the scenario.
+    value: f64,
+    /// The unit, in kg/m³.
+    unit: f64,
+}
+
+impl NamedDensity {
+    /// The largest mass per volume of a scenario.
+    fn of(scenario: &Scenario) -> Option<NamedDensity> {
+        let units = &scenario.units;
+        let (metres, newtons) = (units.meters()?, units.newtons()?);
+        if !units.is_in_seconds() {
+            return None;
+        }
+        let (key, value) = match &scenario.blade {
+            Some(blade) => ("blade.mass_density", blade.largest_mass_density()?),
+            None => (
+                "section.mass_density",
+                scenario.radii.largest_mass_density()?,
+            ),
+        };
+        // The unit of mass is that of force times a second squared over that of length.
+        let unit = newtons / metres.powi(4);
+        Some(NamedDensity { key, value, unit })
+    }
+}
+
 /// A material denser than any, where units are named.
 fn denser_than_anything(scenario: &Scenario) -> Option<PlausibilityWarning> {
-    let units = &scenario.units;
-    let (metres, newtons) = (units.meters()?, units.newtons()?);
-    if !units.is_in_seconds() {
-        return None;
-    }
-    let (key, largest) = match &scenario.blade {
-        Some(blade) => ("blade.mass_density", blade.largest_mass_density()?),
-        None => (
-            "section.mass_density",
-            scenario.radii.largest_mass_density()?,
-        ),
-    };
-    // The unit of mass is that of force times a second squared over that of length.
-    let unit = newtons / metres.powi(4);
-    let density = unit * largest;
+    let NamedDensity { key, value, unit } = NamedDensity::of(scenario)?;
+    let (units, density) = (&scenario.units, unit * value);
     (density > LARGEST_DENSITY).then(|| PlausibilityWarning::DenserThanAnything {
         key,
         density,
@@ -408,6 +453,28 @@ fn denser_than_anything(scenario: &Scenario) -> Option<PlausibilityWarning> {
         force: units.force.clone().unwrap_or_default(),
         water: WATER / unit,
     })
+}
+
+/// A material lighter than air, where units are named.
+fn lighter_than_air(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let NamedDensity { key, value, unit } = NamedDensity::of(scenario)?;
+    let density = unit * value;
+    (0.0 < density && density < AIR).then_some(PlausibilityWarning::LighterThanAir { key, density })
+}
+
+/// The radius of gyration that is assumed, where it is far from that of known sections.
+fn assumed_rotary_inertia(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let dynamics = &scenario.dynamics;
+    let given = dynamics.density != Dynamics::default_for(&scenario.rods).density;
+    if !given || dynamics.polar_inertia != PolarInertia::Excess(0.0) {
+        return None;
+    }
+    // That of a rectangle, of which no section has much more.
+    let gyration = scenario.radii.largest_side(0)? / 12.0_f64.sqrt();
+    let assumed = (dynamics.rotary_inertia[0].at(0.5) / dynamics.density[0].at(0.5)).sqrt();
+    let times = assumed / gyration;
+    (times > PLAUSIBLE.gyration_ratio)
+        .then_some(PlausibilityWarning::AssumedRotaryInertia { times })
 }
 
 /// A material stiffer than any, where units are named.

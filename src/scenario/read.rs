@@ -240,6 +240,7 @@ impl Entries {
             coupling,
             tissue,
             tissue_grown: self.value_or_default(Key::TissueGrown)?.switch()?,
+            natural: None,
             gravity: weights.shared,
             own_gravity: weights.own,
             g,

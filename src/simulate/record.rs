@@ -45,6 +45,9 @@ pub struct Record {
     pub segments: usize,
     /// Permitted local error of a step of the semi-implicit method.
     pub tolerance: f64,
+    /// External damping per length, if the scenario gives none: critical for the lowest mode of a clamped vein.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub assumed_damping: Option<f64>,
     /// The requested duration.
     pub duration: f64,
     /// The time of the last output.
@@ -129,6 +132,8 @@ impl Record {
             length: scenario::longest(&scenario.rods),
             segments: simulation.segments(),
             tolerance: simulation.tolerance(),
+            assumed_damping: (scenario.dynamics.assumes_damping)
+                .then_some(scenario.dynamics.external_damping),
             duration: scenario.dynamics.duration,
             time: moments.last().map_or(0.0, |moment| moment.time),
             error_estimate: moments.last().and_then(|moment| moment.error),

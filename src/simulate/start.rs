@@ -14,6 +14,7 @@ use crate::scenario::{MotionStart, Scenario, Schedule};
 use crate::simulate::remark::MotionDoubt;
 use crate::simulate::request::SimulationError;
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Largest force in a segment of the arcs that a leaf is released from, in units of A/L^2 of its
 /// rod. A rod under a larger one buckles in waves shorter than an eighth of its length, which few
@@ -107,6 +108,9 @@ pub(super) fn scenario_at_start(scenario: &Scenario) -> Scenario {
     match (&mut scenario.wind, air) {
         (Some(wind), Some(air)) if air != [0.0; 3] => wind.velocity = Schedule::constant(air),
         (wind, _) => *wind = None,
+    }
+    if factor != 1.0 {
+        scenario.natural = Some(Arc::new(scenario.clone()));
     }
     let rods = scenario.rods.iter_mut();
     for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {

@@ -191,6 +191,19 @@ impl ParameterKeys {
         &self.0
     }
 
+    /// Keys as they are written, of which that of a vector stands for all of its components.
+    ///
+    /// # Errors
+    /// As those of [`ParameterKeys::from_str`].
+    pub fn parse_with_vectors(text: &str) -> Result<ParameterKeys, VaryError> {
+        match EntryPath::parse(text.trim()) {
+            Ok(part) if part.is_whole_vector() => {
+                Ok(ParameterKeys(vec![VariableTarget::Entry(part)]))
+            }
+            _ => text.parse(),
+        }
+    }
+
     /// The reference magnitude of the number if it is zero, in a scenario's units.
     pub(crate) fn reference_magnitude(&self, scenario: &Scenario) -> f64 {
         let unit = |target: &VariableTarget| match target {

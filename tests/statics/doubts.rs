@@ -107,6 +107,42 @@ fn sections_in_other_units_are_named() {
     assert!(of_section(true, "section.diameter=14.0; load.gravity=[0, 0, 0]").is_empty());
 }
 
+/// Materials that no material is: denser than osmium (22,600 kg/m³), lighter than air (1.225), stiffer than
+/// diamond (1,220 GPa). In cm, N and s the unit of density is 1e8 kg/m³, that of a modulus 10 kPa.
+#[test]
+fn impossible_materials_are_named() {
+    const STRIP: &str = r#"
+        name = "strip"
+        units = { length = "cm", force = "N", time = "s" }
+        leaf = { rods = 1, length = 15.0, fan = [0.0] }
+        section = { shape = "rectangle", width = 1.0, thickness = 0.03, young = 2e4, mass_density = 1e-5 }
+    "#;
+    let table = "
+        =>
+        section.mass_density=2.25e-4 =>
+        section.mass_density=2.27e-4 => denser-than-anything
+        section.mass_density=1.24e-8 =>
+        section.mass_density=1.21e-8 => lighter-than-air
+        section.young=1.21e8 =>
+        section.young=1.23e8 => stiffer-than-diamond
+    ";
+    let doubts = |text: &str, entries: &str| settle(base(text, entries).scenario(), 1e-5).doubts;
+    for (entries, code) in pairs(table) {
+        assert_eq!(codes(&doubts(STRIP, entries)), code, "{entries}");
+    }
+    // A mass per length tells nothing of the inertia of a section, which is known here.
+    let by_length = STRIP.replace(
+        ", mass_density = 1e-5 }",
+        " }\ndynamics = { density = 3e-7 }",
+    );
+    assert_eq!(codes(&doubts(&by_length, "")), "assumed-rotary-inertia");
+    assert_eq!(
+        codes(&doubts(&by_length, "dynamics.rotary_inertia=1.25e-8")),
+        ""
+    );
+    assert_eq!(codes(&doubts(&by_length, "section.width=3.0")), "");
+}
+
 /// A weight per length and an acceleration add up: both state the same weight, or contradict each
 /// other by a factor or in direction. Nothing is said where only one is given.
 #[test]

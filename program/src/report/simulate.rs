@@ -8,7 +8,7 @@ use crate::report::numbers::{
 use crate::report::table::{LabelledLines, label_first_line};
 use leafdyn::numbers::{larger, largest};
 use leafdyn::scenario::Units;
-use leafdyn::scenario::units::{ENERGY, TIME};
+use leafdyn::scenario::units::{DAMPING, ENERGY, TIME};
 use leafdyn::simulate::{LandingRecord, Record, SchemeReason};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
@@ -32,6 +32,14 @@ impl ReportedResult for Record {
         if self.choice.reason != SchemeReason::Requested {
             lines.push(("choice", self.choice.to_string()));
         }
+        lines.extend(self.assumed_damping.map(|damping| {
+            let damping = number_in_unit(format_five_digits(damping), units, DAMPING);
+            let text = format!(
+                "external {damping}, assumed: critical for the lowest mode, so that a leaf creeps to rest; \
+                 dynamics.external_damping sets it"
+            );
+            ("damping", text)
+        }));
         lines.extend(energy_lines(self, units));
         let landings = self
             .landings

@@ -94,7 +94,15 @@ fn extremes_line(sweep: &Sweep, quantity: LeafQuantity, units: &Units) -> Option
     );
     let text = |(row, value, error): &(&SweepRow, f64, f64)| {
         let value = format_five_digits(round_to_error(*value, *error));
-        let value = number_in_unit(value, units, quantity.dimension());
+        let unit = match quantity {
+            LeafQuantity::Frequency(_) => units.frequency(),
+            _ => units.unit_name(quantity.dimension()),
+        };
+        let value = [value]
+            .into_iter()
+            .chain(unit)
+            .collect::<Vec<_>>()
+            .join(" ");
         format!("{value} at {}", sweep.request.texts(row.leaf).join(", "))
     };
     Some(format!("{quantity} from {} to {}", text(low), text(high)))

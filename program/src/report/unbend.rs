@@ -2,12 +2,14 @@
 
 use crate::report::document::ReportedResult;
 use crate::report::numbers::{
-    count_in_words, duration_text, format_five_digits, number_in_key_unit, round_to_error,
+    count_in_words, duration_text, format_five_digits, number_in_key_unit, number_in_unit,
+    round_to_error,
 };
 use crate::report::table::{LabelledLines, csv_writer_without_header, label_first_line, text_cell};
 use leafdyn::posture::Governing;
 use leafdyn::posture::leaf::ModulusMeaning;
 use leafdyn::scenario::Units;
+use leafdyn::scenario::units::LENGTH;
 use leafdyn::study::{
     CriticalYoung, PostureIndex, PostureOutcome, PostureRow, Postures, SlowLoading, Unbending,
 };
@@ -122,7 +124,11 @@ impl ReportedResult for Unbending {
                 "points",
                 format!(
                     "standard deviation {} ({given}), smoothed to {:.1} coefficients a coordinate",
-                    format_five_digits(round_to_error(smoothing.sd, 0.05 * smoothing.sd)),
+                    number_in_unit(
+                        format_five_digits(round_to_error(smoothing.sd, 0.05 * smoothing.sd)),
+                        units,
+                        LENGTH
+                    ),
                     smoothing.degrees_of_freedom
                 ),
             ));

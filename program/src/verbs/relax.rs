@@ -68,6 +68,7 @@ pub struct RelaxArguments {
         long,
         value_name = "KEY,...",
         value_delimiter = ',',
+        value_parser = ParameterKeys::parse_with_vectors,
         conflicts_with = "all"
     )]
     sensitivity: Vec<ParameterKeys>,

@@ -11,12 +11,13 @@ use crate::motion::moving_supports::MovingNode;
 use crate::rod::Wrench;
 use glam::DVec3;
 
-/// The moment and the force on a node whose support moves, besides those of its segments.
+/// The moment and the force on a node whose support moves, besides those of its segments. A moment that turns with
+/// the section does no work on a clamp: the angular momentum of its node, which stays zero, shows none.
 fn support_load(leaf: &DiscreteLeaf, state: &State, it: &MovingNode) -> Wrench {
     let load = leaf.load(state, it.rod, it.node);
     let follower = leaf.follower_wrench(state, it.rod, it.node);
     let moment = match (it.holds_rotation, it.node) {
-        (true, _) => load.moment + follower.moment,
+        (true, _) => load.moment,
         (false, 0) => -leaf.spring_load(state, it.rod, 0).moment,
         (false, _) => DVec3::ZERO,
     };

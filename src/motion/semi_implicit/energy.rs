@@ -18,9 +18,7 @@ impl SemiImplicit {
         };
         exchange.work += self.work_of_supports();
         if self.physics.retardation > 0.0 {
-            let power = self.power_of_friction(h);
-            exchange.dissipated += 0.5 * h * (self.friction_power + power);
-            self.friction_power = power;
+            exchange.dissipated += self.work_of_friction(h);
         }
         exchange
     }
@@ -67,26 +65,35 @@ impl SemiImplicit {
         segments.zip(&self.sections).map(energy).sum()
     }
 
-    /// Power of internal friction at the end of a step of `h`.
-    pub(super) fn power_of_friction(&self, h: f64) -> f64 {
+    /// The work of internal friction in the accepted step of `h`: the mean of its stresses at both ends times
+    /// the change of the strains. Rates that decay within the step, as after a landing, count with the strain
+    /// over which they do, not with the time of the step.
+    fn work_of_friction(&mut self, h: f64) -> f64 {
         let [c0, c1, c2] = rate_weights(h, self.past_step);
-        let mut power = 0.0;
+        let mut work = 0.0;
         for (i, now) in self.strains().iter().enumerate() {
             let section = &self.sections[i];
-            let rate = |kind: usize| {
-                c0 * now[kind]
-                    + c1 * self.strain_history[0][i][kind]
-                    + c2 * self.strain_history[1][i][kind]
-            };
-            let (v, u) = (rate(0), rate(1));
-            for c in 0..3 {
-                if section.compliance[c] > 0.0 {
-                    power += section.ds * v[c] * v[c] / section.compliance[c];
+            // Not against strains that are suppressed.
+            let resistance = |compliance: f64| {
+                if compliance > 0.0 {
+                    compliance.recip()
+                } else {
+                    0.0
                 }
-                power += section.ds * u[c] * u[c] * section.couple_stiffness[c];
+            };
+            let stiffness = [
+                DVec3::from_array(section.compliance.to_array().map(resistance)),
+                section.couple_stiffness,
+            ];
+            for (kind, stiffness) in stiffness.into_iter().enumerate() {
+                let [last, before] = self.strain_history.each_ref().map(|it| it[i][kind]);
+                let rate = c0 * now[kind] + c1 * last + c2 * before;
+                let mean = 0.5 * (self.strain_rates[i][kind] + rate);
+                work += section.ds * (stiffness * mean).dot(now[kind] - last);
+                self.strain_rates[i][kind] = rate;
             }
         }
-        self.physics.retardation * power
+        self.physics.retardation * work
     }
 
     /// The mean momentum of the accepted step times its displacement: the work of
@@ -145,7 +152,8 @@ impl SemiImplicit {
             let shift = self.state.x[k] - self.trial.x[k];
             load.moment.dot(turn) + load.force.dot(shift)
         };
-        let nodes = self.leaf.rod_index_pairs(self.leaf.moving_nodes());
+        // Also on bases, whose supports may move.
+        let nodes = self.leaf.rod_index_pairs(0..self.leaf.segments() + 1);
         nodes.map(work).sum()
     }
 

@@ -177,8 +177,8 @@ pub struct SemiImplicit {
     strain_history: [Vec<[DVec3; 2]>; 2],
     /// Length of the last step; zero if there was none.
     past_step: f64,
-    /// Power of internal friction at the last step.
-    friction_power: f64,
+    /// Rates of the strains (v, u) of all segments at the last step.
+    strain_rates: Vec<[DVec3; 2]>,
     system: System,
     solver: DefiniteSolver,
     state: State,
@@ -217,7 +217,7 @@ impl SemiImplicit {
             strips: leaf.tissue_data().to_vec(),
             strain_history: [Vec::new(), Vec::new()],
             past_step: 0.0,
-            friction_power: 0.0,
+            strain_rates: Vec::new(),
             system: System::new(&leaf),
             solver: DefiniteSolver::default(),
             state: state.clone(),
@@ -246,8 +246,9 @@ impl SemiImplicit {
             physics,
         };
         motion.initialize();
-        motion.start_supports();
         motion.strain_history = [motion.strains(), motion.strains()];
+        motion.strain_rates = vec![[DVec3::ZERO; 2]; motion.strain_history[0].len()];
+        motion.start_supports();
         let start = motion.snapshot();
         motion.balance.begin(&start);
         motion

@@ -309,8 +309,12 @@ impl SemiImplicit {
             set_support_motions(&self.supports, &mut self.node_motions);
         }
         if retarded {
-            self.strain_history[0] = self.strains();
-            self.friction_power = self.power_of_friction(self.past_step);
+            let strains = self.strains();
+            let rates = strains.iter().zip(&self.strain_history[1]);
+            self.strain_rates = rates
+                .map(|(now, last)| [0, 1].map(|kind| (now[kind] - last[kind]) / self.past_step))
+                .collect();
+            self.strain_history[0] = strains;
         }
     }
 }

@@ -192,6 +192,18 @@ impl EntryPath {
         self.list.is_none() && self.indices[0].is_none() && !self.scale
     }
 
+    /// Whether the path names a vector along the lab axes, and none of its components.
+    pub(crate) fn is_whole_vector(&self) -> bool {
+        let vector = matches!(
+            self.key.form(),
+            ValueSchema::Vector
+                | ValueSchema::VectorOrInTime
+                | ValueSchema::VectorPerRod
+                | ValueSchema::VectorQuantity(_)
+        );
+        vector && self.is_whole()
+    }
+
     /// Whether the path names a place where nodes must be, on the way from the base to the tip.
     pub(crate) fn is_node_position(&self) -> bool {
         self.list == Some("at") || matches!(self.key, Key::PointAt | Key::GripAt)

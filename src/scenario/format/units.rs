@@ -42,6 +42,9 @@ pub const RATE: Dimension = [0, 0, -1];
 /// The dimension of masses.
 pub const MASS: Dimension = [-1, 1, 2];
 
+/// The dimension of external damping: force per length and velocity.
+pub const DAMPING: Dimension = [-2, 1, 1];
+
 /// Names of the units a scenario is written in.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Units {

@@ -189,8 +189,12 @@ fn check_data_count(free: usize, count: usize, known: bool) -> Result<(), FitErr
     }
     if !known && free == count {
         return Err(FitError::Free(format!(
-            "{count} numbers are free, and there are as many data, whose standard deviations are not \
-             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more"
+            "{} free, and there are as many data, whose standard deviations are not \
+             known: nothing is left to tell them: add columns sd_tip_x, ..., free fewer, or measure more",
+            match count {
+                1 => "one number is".to_owned(),
+                _ => format!("{count} numbers are"),
+            }
         )));
     }
     Ok(())
