@@ -75,6 +75,7 @@ pub fn unbend_groups(
             young: young.clone(),
             check: false,
             slow_loading: false,
+            is_unit_known: leaf.is_unit_known,
             ..UnbendRequest::new(scenario.clone(), leaf.points.clone())
         })
         .collect();

@@ -37,6 +37,8 @@ pub struct NamedPosture {
     pub points: PosturePoints,
     /// What coordinates were taken for, where that is not what their names say.
     pub taken: Option<String>,
+    /// Whether the format of the table says the unit of the points.
+    pub is_unit_known: bool,
     /// The scenario with the sections and the weight that the table has besides the points, if it has.
     pub scenario: Option<Box<Scenario>>,
 }
@@ -86,6 +88,7 @@ pub fn read_postures(
                  modulus in GPa"
                     .into(),
             ),
+            is_unit_known: true,
             scenario: Some(Box::new(sheet.scenario(file, scenario)?)),
         }]);
     }
@@ -224,6 +227,7 @@ fn read_points(
                     ..PosturePoints::default()
                 },
                 taken: taken.map(String::from),
+                is_unit_known: is_adel,
                 scenario: None,
             });
             found.len() - 1

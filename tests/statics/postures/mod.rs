@@ -3,6 +3,7 @@
 
 mod closed_forms;
 mod noisy_points;
+mod point_weights;
 mod refused;
 mod relaxed;
 mod two_postures;

@@ -60,6 +60,49 @@ fn in_space() {
     }
 }
 
+/// The scenario that rests in a posture keeps the section, with its moduli at E, and what else was given of the leaf.
+#[test]
+fn sections_stay_sections() {
+    for (material, shear, meaning) in [
+        ("young = 2e3, poisson = 0.2", "poisson = 0.2", "young = 6000"),
+        ("young = 2e3, shear_modulus = 500.0", "shear_modulus = 1500", "young = 6000"),
+        (
+            "young = { at = [0.0, 1.0], value = [2e3, 1e3] }",
+            "poisson",
+            "value = [6000.0, 3000.0]",
+        ),
+    ] {
+        let leaf = parse(&format!(
+            r#"
+            name = "kept"
+            leaf = {{ rods = 1, length = 1.3, fan = [0.0] }}
+            section = {{ shape = "rectangle", width = {{ at = [0.0, 1.0], value = [0.2, 0.1] }}, thickness = 0.1, mass_density = 20.0, {material} }}
+            load.g = [0.0, 0.0, -1.0]
+            dynamics = {{ internal_damping = 0.01, tip_force = {{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 0.0, -0.1]] }} }}
+            photo = {{ scale = 0.01 }}
+            "#
+        ));
+        let found = posture(&leaf, Twin::draw(&mut Draw(8), false, 1.3).curve(), Some(DVec3::Y));
+        let of = ScenarioRod::new(&leaf).unwrap();
+        let rest = rest_scenario(&leaf, &of, &found, &found.stations(false), 3.0 * of.young);
+        let written = with_level_base(&rest).to_toml();
+        for part in ["[section]", "shape = \"rectangle\"", shear, meaning, "mass_density = 20", "[photo]"] {
+            assert!(written.contains(part), "{part}: {written}");
+        }
+        assert!(!written.contains("[stiffness]"), "{written}");
+        let back = parse(&written);
+        assert_eq!(back.rods, rest.rods);
+        assert_eq!(back.dynamics, rest.dynamics);
+        assert_eq!(back.dynamics.tip_force, leaf.dynamics.tip_force);
+        // A2 at the base: E w t^3/12.
+        let bending = 6e3 * 0.2 * 0.1_f64.powi(3) / 12.0;
+        assert!((back.rods[0].couple_stiffness[1].at(0.0) / bending - 1.0).abs() < 1e-12);
+        if rest.young(0).is_some() {
+            assert_eq!(back.young(0), Some(6e3));
+        }
+    }
+}
+
 /// The leaf whose blade is turned where the normals say so: the same as its scenario in a lab that is turned.
 #[test]
 fn a_blade_with_measured_normals() {
