@@ -4,7 +4,7 @@ use crate::posture::Posture;
 use crate::posture::points::PostureError;
 use crate::posture::rest::Stations;
 use crate::posture::rod::{HangingRod, PointForce};
-use crate::scenario::{PointLoad, Profile, Radii, RodPlace, Scenario};
+use crate::scenario::{Profile, Radii, RodPlace, Scenario};
 use crate::words;
 use glam::{DQuat, DVec3};
 
@@ -62,6 +62,7 @@ impl ScenarioRod {
                 .map(|point| PointForce {
                     at: point.at,
                     force: vector(scenario.force_on(point)),
+                    offset: point.offset,
                 })
                 .collect(),
             tip_force: vector(scenario.tip_force),
@@ -124,12 +125,6 @@ fn check(scenario: &Scenario) -> Result<(), PostureError> {
             "dead moments have no potential: give forces",
         ),
         (
-            scenario.points.iter().any(PointLoad::is_off_axis),
-            "load.point.offset",
-            "the moment of a force off the axis depends on how the section is turned: leave it out, so that the force \
-             acts on the axis",
-        ),
-        (
             !scenario.all_bases_clamped(),
             "leaf.base_held",
             "a base that turns adds a stiffness of its own: clamp it (leave this out), and begin the points above it",
@@ -182,6 +177,7 @@ pub fn rest_scenario(
         places.extend(&both[..if jumps { 2 } else { 1 }]);
     }
     let curvature = stations.linear_rest_curvature(young);
+    let knots = stations.knots();
     let keeps_sections = rest.scale_section_moduli(of.young, young);
     let rod = &mut rest.rods[0];
     rod.length = stations.length;
@@ -191,11 +187,11 @@ pub fn rest_scenario(
         posture.base.elevation,
         posture.base.roll,
     );
-    for axis in 0..3 {
-        rod.rest_curvature[axis] = match curvature.iter().all(|u0| u0[axis] == 0.0) {
+    for (axis, profile) in rod.rest_curvature.iter_mut().enumerate() {
+        *profile = match curvature.iter().all(|u0| u0[axis] == 0.0) {
             true => Profile::Constant(0.0),
             false => Profile::Linear {
-                at: at.clone(),
+                at: knots.clone(),
                 value: curvature.iter().map(|u0| u0[axis]).collect(),
             },
         };
@@ -211,6 +207,10 @@ pub fn rest_scenario(
         for profile in densities.chain(&mut dynamics.rotary_inertia) {
             *profile = sampled(profile, &places);
         }
+    }
+    let dynamics = &mut rest.dynamics;
+    if dynamics.assumes_damping {
+        dynamics.external_damping = dynamics.critical_damping(&rest.rods);
     }
     rest
 }

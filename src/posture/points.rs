@@ -142,6 +142,9 @@ const MOST_DETOUR: f64 = 1.8;
 /// it is farther than four times that.
 const AT_BASE: f64 = 0.03;
 
+/// Logarithm of the ratio up to which a leaf may be longer or shorter than in a unit in which its points are guessed.
+const NEAR_UNIT: f64 = 1.1;
+
 /// Units in which points may be, and their meters.
 const LENGTH_UNITS: [(&str, f64); 4] = [("m", 1.0), ("cm", 0.01), ("mm", 1e-3), ("in", 0.0254)];
 
@@ -205,6 +208,7 @@ impl PosturePoints {
         };
         let units = LENGTH_UNITS.iter().filter(|_| meters.is_some());
         let nearest = units.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        let nearest = nearest.filter(|(_, of_unit)| off(*of_unit) < NEAR_UNIT);
         Err(PostureError::OtherUnit {
             length,
             given,

@@ -42,9 +42,10 @@ pub fn unbend(request: &UnbendRequest) -> Result<Unbending, UnbendError> {
         }
     }
     let of = ScenarioRod::new(&request.scenario)?;
-    check_units(request)?;
     let base = Some(of.base);
     let posture = Posture::from_points(of.rod.clone(), &request.points, base)?;
+    // Points out of order are longer than their leaf, too.
+    check_units(request)?;
     let compared = match &request.second {
         Some(second) => {
             let other = Posture::from_points(of.rod.clone(), &second.points, base)

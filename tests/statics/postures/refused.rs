@@ -144,7 +144,10 @@ fn points_in_another_unit() {
         ..UnbendRequest::new(named("cm"), points())
     };
     let why = unbend(&second).unwrap_err().to_string();
-    assert!(why.starts_with("second posture") && why.contains("in mm?"), "{why}");
+    assert!(
+        why.starts_with("second posture") && why.contains("in mm?"),
+        "{why}"
+    );
     // A format that has a unit may have leaves of any length.
     let known = UnbendRequest {
         is_unit_known: true,
