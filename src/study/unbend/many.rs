@@ -76,7 +76,10 @@ pub fn unbend_groups(
             check: false,
             slow_loading: false,
             is_unit_known: leaf.is_unit_known,
-            ..UnbendRequest::new(scenario.clone(), leaf.points.clone())
+            ..UnbendRequest::new(
+                leaf.scenario.as_deref().unwrap_or(scenario).clone(),
+                leaf.points.clone(),
+            )
         })
         .collect();
     let found = unbend_many(&requests);
