@@ -39,10 +39,11 @@ fn masses_on_points_are_as_forces() {
     let rest = weighed.rest.unwrap();
     let read = parse(&rest.to_toml());
     let stiffness = |scenario: &Scenario| scenario.rods[0].couple_stiffness.clone();
-    assert_eq!(
-        (stiffness(&read), &read.points),
-        (stiffness(&rest), &rest.points)
-    );
+    assert_eq!(stiffness(&read), stiffness(&rest));
+    // Places that are one within rounding are read as one.
+    for (one, other) in read.points.iter().zip(&rest.points) {
+        assert!((one.at - other.at).abs() < 1e-12 && one.mass == other.mass);
+    }
     assert!(read.weighs_points_only && rest.weighs_points_only);
     // A density of the same leaf has a weight as well.
     let density = ["dynamics.density=1.0".to_string()];
