@@ -536,7 +536,7 @@ fn outlines_are_widths_of_the_scenario() {
     assert!((found / wanted - 1.0).abs() < 1e-9, "{found} {wanted}");
     assert!(
         (least(&told(&place, "wheat.toml --shape midrib.csv --format adel")) / wanted - 1.0).abs()
-            > 0.01
+            > 1e-3
     );
     // Midrib and outline in one table, of one leaf and of several with outlines of their own.
     let both = |leaf: usize, wider: f64| {

@@ -1,6 +1,5 @@
 //! Outlines of blades as the field has them: relative widths r at fractions s of the length, from base to tip.
 
-use crate::numbers::format_two_digits;
 use crate::scenario::Scenario;
 use crate::study::fit::cells::{decode, line_error};
 use crate::study::fit::columns::{DataFileOptions, FitError};
@@ -87,8 +86,7 @@ impl BladeOutline {
         if first[0].abs() > END_TOLERANCE || (last[0] - 1.0).abs() > END_TOLERANCE {
             return Err(format!(
                 "s runs from {} to {}: it is the fraction of the length, 0 at the base and 1 at the tip",
-                format_two_digits(first[0]),
-                format_two_digits(last[0])
+                first[0], last[0]
             ));
         }
         let largest = rows.iter().fold(0.0_f64, |most, [_, r]| most.max(*r));
@@ -102,10 +100,9 @@ impl BladeOutline {
         let [pointed, wide] = POINTED;
         if width[0] < pointed && width[end] > wide {
             return Err(format!(
-                "r is {} of its largest value at s = 0 and {} at s = 1: a blade is pointed at its tip; where s runs from \
+                "r is {:.2} of its largest value at s = 0 and {:.2} at s = 1: a blade is pointed at its tip; where s runs from \
                  tip to base, give 1 - s in its place",
-                format_two_digits(width[0]),
-                format_two_digits(width[end])
+                width[0], width[end]
             ));
         }
         Ok(BladeOutline { at, width })
