@@ -31,6 +31,7 @@ pub enum Points {
 pub struct ReadPoints {
     pub points: PosturePoints,
     taken: Option<String>,
+    is_unit_known: bool,
     /// The scenario with what the table has besides points, if it has.
     scenario: Option<Box<Checked>>,
     name: String,
@@ -61,6 +62,7 @@ impl Points {
         Ok(ReadPoints {
             points: first.points,
             taken: first.taken,
+            is_unit_known: first.is_unit_known,
             scenario: first.scenario,
             name,
         })
@@ -167,6 +169,7 @@ pub fn unbend(
             roll: roll.to_radians(),
         }),
         slow_loading,
+        is_unit_known: read.is_unit_known,
         ..UnbendRequest::new((*input).clone(), read.points)
     };
     let found = run(py, progress, move |monitor| {
@@ -212,6 +215,7 @@ pub fn unbend_many(
                 young: range(young),
                 check: false,
                 slow_loading: false,
+                is_unit_known: read.is_unit_known,
                 ..UnbendRequest::new((**input).clone(), read.points.clone())
             });
         }

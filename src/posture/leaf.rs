@@ -4,7 +4,7 @@ use crate::posture::Posture;
 use crate::posture::points::PostureError;
 use crate::posture::rest::Stations;
 use crate::posture::rod::{HangingRod, PointForce};
-use crate::scenario::{PointLoad, Profile, Radii, RodPlace, Scenario};
+use crate::scenario::{Profile, Radii, RodPlace, Scenario};
 use crate::words;
 use glam::{DQuat, DVec3};
 
@@ -62,6 +62,7 @@ impl ScenarioRod {
                 .map(|point| PointForce {
                     at: point.at,
                     force: vector(scenario.force_on(point)),
+                    offset: point.offset,
                 })
                 .collect(),
             tip_force: vector(scenario.tip_force),
@@ -70,7 +71,7 @@ impl ScenarioRod {
             return Err(refuse(
                 "load.gravity",
                 "no load acts, so that the posture says nothing of the stiffness: give the weight per length, or \
-                 load.g and a density",
+                 load.g and a density or masses of points",
             ));
         }
         Ok(ScenarioRod {
@@ -124,12 +125,6 @@ fn check(scenario: &Scenario) -> Result<(), PostureError> {
             "dead moments have no potential: give forces",
         ),
         (
-            scenario.points.iter().any(PointLoad::is_off_axis),
-            "load.point.offset",
-            "the moment of a force off the axis depends on how the section is turned: leave it out, so that the force \
-             acts on the axis",
-        ),
-        (
             !scenario.all_bases_clamped(),
             "leaf.base_held",
             "a base that turns adds a stiffness of its own: clamp it (leave this out), and begin the points above it",
@@ -162,8 +157,8 @@ fn sampled(profile: &Profile, places: &[RodPlace]) -> Profile {
     }
 }
 
-/// The scenario whose leaf rests in a posture at a modulus: inextensible and unshearable, with that curvature at rest
-/// and the loads of `scenario`.
+/// The scenario whose leaf rests in a posture at a modulus, with that curvature at rest and the loads of `scenario`. It
+/// keeps sections that give its stiffnesses, with their moduli at E; else it is inextensible and unshearable.
 pub fn rest_scenario(
     scenario: &Scenario,
     of: &ScenarioRod,
@@ -182,6 +177,8 @@ pub fn rest_scenario(
         places.extend(&both[..if jumps { 2 } else { 1 }]);
     }
     let curvature = stations.linear_rest_curvature(young);
+    let knots = stations.knots();
+    let keeps_sections = rest.scale_section_moduli(of.young, young);
     let rod = &mut rest.rods[0];
     rod.length = stations.length;
     rod.base = stations.ends[0].position.to_array();
@@ -190,50 +187,49 @@ pub fn rest_scenario(
         posture.base.elevation,
         posture.base.roll,
     );
-    for (axis, stiffness) in rod.couple_stiffness.iter_mut().enumerate() {
-        *stiffness = sampled(&of.rod.stiffness[axis], &places).scaled(young);
-        rod.rest_curvature[axis] = match curvature.iter().all(|u0| u0[axis] == 0.0) {
+    for (axis, profile) in rod.rest_curvature.iter_mut().enumerate() {
+        *profile = match curvature.iter().all(|u0| u0[axis] == 0.0) {
             true => Profile::Constant(0.0),
             false => Profile::Linear {
-                at: at.clone(),
+                at: knots.clone(),
                 value: curvature.iter().map(|u0| u0[axis]).collect(),
             },
         };
     }
-    rod.force_stiffness = [f64::INFINITY; 3].map(Profile::Constant);
-    rest.radii = Radii::default();
-    rest.blade = None;
-    rest.photo = None;
-    rest.factored = None;
-    rest.tissue = None;
-    rest.support_motion = None;
-    rest.points = (scenario.points.iter())
-        .map(|point| PointLoad {
-            in_time: None,
-            landing: None,
-            ..point.clone()
-        })
-        .collect();
-    let mut dynamics = scenario.dynamics.clone().with_loads(
-        scenario.gravity,
-        scenario.tip_force,
-        scenario.tip_moment,
-    );
-    for profile in dynamics
-        .density
-        .iter_mut()
-        .chain(&mut dynamics.rotary_inertia)
-    {
-        *profile = sampled(profile, &places);
+    if !keeps_sections {
+        rod.couple_stiffness = (of.rod.stiffness.each_ref())
+            .map(|stiffness| sampled(stiffness, &places).scaled(young));
+        rod.force_stiffness = [f64::INFINITY; 3].map(Profile::Constant);
+        rest.radii = Radii::default();
+        rest.blade = None;
+        let dynamics = &mut rest.dynamics;
+        let densities = dynamics.density.iter_mut();
+        for profile in densities.chain(&mut dynamics.rotary_inertia) {
+            *profile = sampled(profile, &places);
+        }
     }
-    rest.dynamics = dynamics;
+    let dynamics = &mut rest.dynamics;
+    if dynamics.assumes_damping {
+        dynamics.external_damping = dynamics.critical_damping(&rest.rods);
+    }
     rest
 }
 
 /// The same scenario in a lab that is turned about the direction of the base, so that d2 is level there: the format
-/// has no angle for a base that is rolled.
+/// has no angle for a base that is rolled. Photographs, and loads and bases in time, are those of the lab as it was and
+/// are left out of one that is turned.
 pub fn with_level_base(rest: &Scenario) -> Scenario {
     let mut level = rest.clone();
+    if rest.rods[0].roll == 0.0 {
+        return level;
+    }
+    level.photo = None;
+    level.factored = None;
+    level.support_motion = None;
+    for point in &mut level.points {
+        point.in_time = None;
+        point.landing = None;
+    }
     let rolled = rest.rods[0].base_rotation();
     level.rods[0].roll = 0.0;
     let turn: DQuat = level.rods[0].base_rotation() * rolled.conjugate();

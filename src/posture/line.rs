@@ -4,6 +4,9 @@
 //!   n(s) = F + integral of f from s to L        m' = n x r',  m(L) = 0
 //! ```
 //!
+//! A force F that the section holds off the axis, at the lever a from it, adds a x F to the moment of all before it; the
+//! lever turns with the directors.
+//!
 //! Integrals are those of polynomials through the five Gauss points of each element: of order ten over an
 //! element, of order six at its points.
 
@@ -55,6 +58,61 @@ pub enum Directors {
     Measured(Vec<[DVec3; 2]>),
 }
 
+/// Values at the end of an element of the polynomials that are 1 at one of its Gauss points and 0 at the others.
+static END_VALUES: LazyLock<[f64; POINTS]> = LazyLock::new(|| {
+    let at = |k: usize| GAUSS_LEGENDRE_RULE[k].at;
+    std::array::from_fn(|j| {
+        let others = (0..POINTS).filter(|&k| k != j);
+        others.map(|k| (1.0 - at(k)) / (at(j) - at(k))).product()
+    })
+});
+
+/// A force that the section at an end of an element holds off the axis.
+#[derive(Clone, Copy, Debug)]
+struct SectionLever {
+    /// The number of the end; the last one is the tip.
+    end: usize,
+    force: DVec3,
+    /// Along d2 and d3.
+    offset: [f64; 2],
+    /// d3 there, in the lab.
+    third: DVec3,
+    /// The derivative of the curve there less that of the polynomial through the Gauss points before.
+    remainder: DVec3,
+}
+
+impl SectionLever {
+    /// The lever on a curve with these derivatives at the Gauss points, which may be another one nearby: the section
+    /// turns with the tangent, the shortest way.
+    fn on_curve(&self, first: &[DVec3]) -> ForceOffAxis {
+        let tangent = (end_value(self.end, first) + self.remainder).normalize_or_zero();
+        let third = (self.third - self.third.dot(tangent) * tangent).normalize_or_zero();
+        let [along_2, along_3] = self.offset;
+        ForceOffAxis {
+            end: self.end,
+            force: self.force,
+            arm: along_2 * third.cross(tangent) + along_3 * third,
+        }
+    }
+}
+
+/// The value at an end of an element of the polynomial through the Gauss points of the element before it.
+fn end_value(end: usize, values: &[DVec3]) -> DVec3 {
+    let own = &values[(end - 1) * POINTS..end * POINTS];
+    own.iter().zip(*END_VALUES).map(|(v, part)| part * *v).sum()
+}
+
+/// A force off the axis on a curve.
+#[derive(Clone, Copy, Debug)]
+pub struct ForceOffAxis {
+    /// The number of the end of an element where the section holds it; the last one is the tip.
+    pub end: usize,
+    /// The force.
+    pub force: DVec3,
+    /// From the axis to the force, in the lab.
+    pub arm: DVec3,
+}
+
 /// The elements of a posture and what belongs to their Gauss points, whatever the curve.
 #[derive(Clone, Debug)]
 pub struct Elements {
@@ -72,6 +130,8 @@ pub struct Elements {
     pub ends: Vec<f64>,
     /// Forces on ends of elements: number of the element behind, and force. Those of the tip follow all.
     forces: Vec<(usize, DVec3)>,
+    /// Those of them that act off the axis; see [`Elements::add_levers`].
+    levers: Vec<SectionLever>,
 }
 
 /// A posture at the Gauss points.
@@ -87,11 +147,13 @@ pub struct Line {
     pub moment: Vec<DVec3>,
     /// Length.
     pub length: f64,
+    /// Forces off the axis.
+    pub levers: Vec<ForceOffAxis>,
 }
 
 /// Moments in the lab at ends of elements and Gauss points, in their order.
 pub struct Moments {
-    /// The moments.
+    /// The moments; at an end where a force acts off the axis, that behind it, but of the tip that before it.
     pub moments: Vec<DVec3>,
     /// The forces; at an end on which one acts, that behind it.
     pub forces: Vec<DVec3>,
@@ -157,13 +219,8 @@ impl Elements {
             }
         }
         let place = |k: usize| RodPlace::within(sigma[k], [ends[k / POINTS], ends[k / POINTS + 1]]);
-        let forces = rod.points.iter().map(|point| {
-            let nearest = (1..ends.len()).min_by(|&a, &b| {
-                let off = |k: usize| (ends[k] - point.at).abs();
-                off(a).total_cmp(&off(b))
-            });
-            (nearest.unwrap_or(ends.len() - 1), point.force)
-        });
+        let forces = rod.points.iter();
+        let forces = forces.map(|point| (nearest_end(&ends, point.at), point.force));
         let mut forces: Vec<(usize, DVec3)> = forces.collect();
         forces.push((ends.len() - 1, rod.tip_force));
         Elements {
@@ -176,7 +233,27 @@ impl Elements {
             sigma,
             ends,
             forces,
+            levers: Vec::new(),
         }
+    }
+
+    /// Adds the levers of forces off the axis to a curve with these derivatives and directors at its ends and Gauss
+    /// points, in their order.
+    pub fn add_levers(&mut self, rod: &HangingRod, first: &[DVec3], directors: &[DMat3]) {
+        let inner: Vec<DVec3> = inner_points(first).collect();
+        let off_axis = rod.points.iter().filter(|point| point.is_off_axis());
+        let levers = off_axis.map(|point| {
+            let end = nearest_end(&self.ends, point.at);
+            let place = end * (POINTS + 1);
+            SectionLever {
+                end,
+                force: point.force,
+                offset: point.offset,
+                third: directors[place].z_axis,
+                remainder: first[place] - end_value(end, &inner),
+            }
+        });
+        self.levers = levers.collect();
     }
 
     /// Elements with ends at equal parts of the length and at the rod's kinks.
@@ -230,11 +307,7 @@ impl Elements {
 
     /// Moments at ends and Gauss points of a curve with these derivatives there, in their order.
     pub fn moments_everywhere(&self, first: &[DVec3]) -> Moments {
-        let inner = first
-            .iter()
-            .enumerate()
-            .filter(|(k, _)| k % (POINTS + 1) != 0);
-        let inner: Vec<DVec3> = inner.map(|(_, d)| *d).collect();
+        let inner: Vec<DVec3> = inner_points(first).collect();
         let line = self.line(&inner);
         let (mut moments, mut forces) = (
             vec![DVec3::ZERO; first.len()],
@@ -243,6 +316,14 @@ impl Elements {
         let (mut behind, mut pull) = (DVec3::ZERO, DVec3::ZERO);
         for e in (0..self.edges.len() - 1).rev() {
             let own = e * POINTS..(e + 1) * POINTS;
+            let last = (e + 1) * (POINTS + 1);
+            let levers = line.levers.iter().filter(|lever| lever.end == e + 1);
+            behind += levers
+                .map(|lever| lever.arm.cross(lever.force))
+                .sum::<DVec3>();
+            if e + 2 == self.edges.len() {
+                moments[last] = behind;
+            }
             let turning = own
                 .clone()
                 .map(|k| self.weight(k) * inner[k].cross(line.force[k]));
@@ -250,7 +331,6 @@ impl Elements {
             for (_, force) in self.forces.iter().filter(|(at, _)| *at == e + 1) {
                 pull += *force;
             }
-            let last = (e + 1) * (POINTS + 1);
             if e + 2 == self.edges.len() {
                 forces[last] = pull;
             }
@@ -318,15 +398,53 @@ impl Elements {
         let loads: Vec<DVec3> = self.load.iter().zip(&speed).map(|(f, v)| *v * *f).collect();
         let force = self.integrate_from_tip(&loads, &self.forces);
         let turning: Vec<DVec3> = first.iter().zip(&force).map(|(d, n)| d.cross(*n)).collect();
-        let moment = self.integrate_from_tip(&turning, &[]);
+        let levers: Vec<ForceOffAxis> = self.levers.iter().map(|it| it.on_curve(first)).collect();
+        let jumps = levers.iter();
+        let jumps: Vec<_> = jumps.map(|it| (it.end, it.arm.cross(it.force))).collect();
+        let moment = self.integrate_from_tip(&turning, &jumps);
         Line {
             length: (0..speed.len()).map(|k| self.weight(k) * speed[k]).sum(),
             tangent: first.iter().zip(&speed).map(|(d, v)| *d / *v).collect(),
             speed,
             force,
             moment,
+            levers,
         }
     }
+}
+
+/// Levers whose moments out of a plane are below this part of them balance each other.
+const BALANCED: f64 = 1e-9;
+
+impl Line {
+    /// Whether the forces off the axis, all of which are along the plane with this normal, have moments within it alone:
+    /// those beside it are alike on both sides.
+    pub fn has_levers_alike_on_both_sides(&self, normal: DVec3) -> bool {
+        self.levers.iter().all(|lever| {
+            let here = self.levers.iter().filter(|it| it.end == lever.end);
+            let (mut sum, mut size) = (DVec3::ZERO, 0.0);
+            for it in here {
+                sum += it.arm.dot(normal) * it.force;
+                size += it.arm.length() * it.force.length();
+            }
+            sum.length() <= BALANCED * size
+        })
+    }
+}
+
+/// The end of an element, but the base, that is nearest to a fraction of the length.
+fn nearest_end(ends: &[f64], at: f64) -> usize {
+    let off = |k: usize| (ends[k] - at).abs();
+    let nearest = (1..ends.len()).min_by(|&a, &b| off(a).total_cmp(&off(b)));
+    nearest.unwrap_or(ends.len() - 1)
+}
+
+/// Of values at ends and Gauss points those at the latter.
+fn inner_points(values: &[DVec3]) -> impl Iterator<Item = DVec3> {
+    let counted = values.iter().enumerate();
+    counted
+        .filter(|(k, _)| k % (POINTS + 1) != 0)
+        .map(|(_, value)| *value)
 }
 
 /// Fractions of the length at ends of elements, and the length.

@@ -37,7 +37,7 @@ words! {
         InPlane = "in-plane",
         /// It would twist and bend out of that plane.
         OutOfPlane = "out-of-plane",
-        /// The posture lies in no plane.
+        /// The posture lies in no plane, or forces off the axis lead out of it.
         Spatial = "spatial",
     }
 }
@@ -162,19 +162,25 @@ impl Posture {
         frame_rule: FrameRule,
         count: usize,
     ) -> Posture {
-        let elements = Elements::new(&rod, count, &|t| centreline.at(t));
-        let first: Vec<DVec3> = elements
-            .at
-            .iter()
-            .map(|&t| centreline.at(t).first)
-            .collect();
-        let line = elements.line(&first);
+        let mut elements = Elements::new(&rod, count, &|t| centreline.at(t));
         let base = BaseFrame::new(
             centreline.at(0.0).first,
             centreline.at(1.0).position - centreline.at(0.0).position,
             plane,
             &frame_rule,
         );
+        if rod.has_levers() {
+            let (at, _) = elements.ends_and_points();
+            let curve: Vec<CurvePoint> = at.iter().map(|&t| centreline.at(t)).collect();
+            let first: Vec<DVec3> = curve.iter().map(|point| point.first).collect();
+            let positions: Vec<DVec3> = curve.iter().map(|point| point.position).collect();
+            let tangents: Vec<DVec3> = first.iter().map(|d| d.normalize_or_zero()).collect();
+            let frames = frame_rule.along(base.rotation(), &at, &positions, &tangents);
+            elements.add_levers(&rod, &first, &frames);
+        }
+        let at = elements.at.iter();
+        let first: Vec<DVec3> = at.map(|&t| centreline.at(t).first).collect();
+        let line = elements.line(&first);
         let mut parts = Vec::new();
         let mut add = |governing, directors: Directors, about: &'static [usize]| {
             let problem = SecondVariation::new(&elements, &line, &directors, about);
@@ -189,6 +195,7 @@ impl Posture {
         match (plane, frame_rule.directors(&elements)) {
             (_, Some(measured)) => add(Governing::Spatial, measured, &[0, 1, 2]),
             (Some(normal), None) => {
+                let is_split = line.has_levers_alike_on_both_sides(normal);
                 // A round section may take its plane's normal as d2, wherever that is.
                 let director = if vertical_plane(normal) || rod.is_round() {
                     1
@@ -200,8 +207,13 @@ impl Posture {
                     1 => (&[1], &[0, 2]),
                     _ => (&[2], &[0, 1]),
                 };
-                add(Governing::InPlane, directors.clone(), inside);
-                add(Governing::OutOfPlane, directors, outside);
+                match is_split {
+                    true => {
+                        add(Governing::InPlane, directors.clone(), inside);
+                        add(Governing::OutOfPlane, directors, outside);
+                    }
+                    false => add(Governing::Spatial, directors, &[0, 1, 2]),
+                }
             }
             (None, None) => add(Governing::Spatial, Directors::Round, &[0, 1, 2]),
         }
@@ -347,6 +359,7 @@ impl Posture {
 
     /// Whether the posture was taken to lie in a plane.
     pub fn is_planar(&self) -> bool {
-        self.parts.len() > 1
+        let first = self.parts.first();
+        first.is_some_and(|part| matches!(part.directors, Directors::Planar { .. }))
     }
 }

@@ -74,6 +74,16 @@ pub enum PostureError {
         /// The point, counted from 1.
         point: usize,
     },
+    /// Points that are many times as long or as short as the leaf.
+    #[error("the points are {length:.4} long and leaf.length is {given:.4}: {}", unit_advice(*.unit))]
+    OtherUnit {
+        /// Of the points.
+        length: f64,
+        /// Of the leaf.
+        given: f64,
+        /// The unit in which they would have about that length, if the scenario names its own.
+        unit: Option<&'static str>,
+    },
     /// A shape whose length is not that of the leaf.
     #[error(
         "the shape is {length:.4} long and the leaf {given:.4}: give points in the unit of the scenario, from its base to \
@@ -112,6 +122,18 @@ pub enum PostureError {
     },
 }
 
+/// What to do with points in another unit.
+fn unit_advice(unit: Option<&str>) -> String {
+    let guess = unit.map_or("another unit".into(), |unit| unit.to_string());
+    format!(
+        "are they in {guess}? Give them in the unit of the scenario, or a factor for each of their columns (as in \
+         x=x:0.1), or mend leaf.length"
+    )
+}
+
+/// Points this many times as long or as short as the leaf are those of another unit.
+const OTHER_UNIT: f64 = 8.0;
+
 /// Points farther apart than this many times the length of the shortest tree that joins all of them, if followed in
 /// their order, are not in order: noise alone makes it 1.5 at most where it is as large as their distances.
 const MOST_DETOUR: f64 = 1.8;
@@ -119,6 +141,12 @@ const MOST_DETOUR: f64 = 1.8;
 /// The last point is at the scenario's base if it is nearer than this fraction of the length, and the first is not if
 /// it is farther than four times that.
 const AT_BASE: f64 = 0.03;
+
+/// Logarithm of the ratio up to which a leaf may be longer or shorter than in a unit in which its points are guessed.
+const NEAR_UNIT: f64 = 1.1;
+
+/// Units in which points may be, and their meters.
+const LENGTH_UNITS: [(&str, f64); 4] = [("m", 1.0), ("cm", 0.01), ("mm", 1e-3), ("in", 0.0254)];
 
 /// A step follows a direction if the cosine of the angle between them is larger.
 const FOLLOWS_DIRECTION: f64 = 0.7;
@@ -156,6 +184,36 @@ impl PosturePoints {
         first.distance(base) > 4.0 * AT_BASE * length
             && along(first, second) < 0.0
             && along(last, before) > FOLLOWS_DIRECTION
+    }
+
+    /// The length of the polygon through the points.
+    fn polygon_length(&self) -> f64 {
+        let pairs = self.positions.windows(2);
+        pairs.map(|pair| pair[0].distance(pair[1])).sum()
+    }
+
+    /// Checks that the points are about as long as the leaf, whose unit of length is so many meters, if that is known.
+    ///
+    /// # Errors
+    /// Points that are probably in another unit.
+    pub fn check_unit(&self, given: f64, meters: Option<f64>) -> Result<(), PostureError> {
+        let length = self.polygon_length();
+        let times = length / given;
+        if !(times >= OTHER_UNIT || times <= 1.0 / OTHER_UNIT) {
+            return Ok(());
+        }
+        let off = |of_unit: f64| {
+            let own = meters.unwrap_or(1.0) / times;
+            (of_unit / own).ln().abs()
+        };
+        let units = LENGTH_UNITS.iter().filter(|_| meters.is_some());
+        let nearest = units.min_by(|a, b| off(a.1).total_cmp(&off(b.1)));
+        let nearest = nearest.filter(|(_, of_unit)| off(*of_unit) < NEAR_UNIT);
+        Err(PostureError::OtherUnit {
+            length,
+            given,
+            unit: nearest.map(|(name, _)| *name),
+        })
     }
 
     /// Checks the points themselves.

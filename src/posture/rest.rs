@@ -26,7 +26,7 @@ pub struct Station {
     pub curvature: DVec3,
     /// Force n; where a force acts on the point, that towards the tip.
     pub force: DVec3,
-    /// Moment m.
+    /// Moment m; where a force acts off the axis, that towards the tip, at the tip itself that before it.
     pub moment: DVec3,
     /// A^-1 m at the modulus 1: at the modulus E the curvature at rest is u less this divided by E.
     pub compliance: DVec3,
@@ -62,13 +62,15 @@ pub struct Stations {
     between: Vec<Station>,
     /// The length.
     pub length: f64,
+    /// Fractions of the length where A^-1 m jumps, and with it the curvature at rest.
+    jumps: Vec<f64>,
 }
 
 impl Posture {
     /// The posture at the ends of equal parts of its length, with bands if `bands`.
     pub fn stations(&self, bands: bool) -> Stations {
         let curve = |t: f64| self.centreline.at(t);
-        let elements = Elements::at_equal_parts(&self.rod, PARTS, &curve);
+        let mut elements = Elements::at_equal_parts(&self.rod, PARTS, &curve);
         let (at, is_end) = elements.ends_and_points();
         let points: Vec<_> = at.iter().map(|&t| curve(t)).collect();
         let first: Vec<DVec3> = points.iter().map(|point| point.first).collect();
@@ -77,6 +79,7 @@ impl Posture {
         let frames = self
             .frame_rule
             .along(self.base.rotation(), &at, &positions, &tangents);
+        elements.add_levers(&self.rod, &first, &frames);
         let found = elements.moments_everywhere(&first);
         let sigma = elements.sigma_everywhere();
         let station = |k: usize| {
@@ -110,6 +113,7 @@ impl Posture {
             ends,
             between,
             length: found.length,
+            jumps: self.rod.compliance_jumps(),
         }
     }
 
@@ -267,24 +271,64 @@ impl Stations {
         (at, vec![rod])
     }
 
-    /// The curvature at rest at a modulus as a continuous function that is linear between the ends of the parts.
+    /// The numbers of the first and the last end of each stretch without a jump.
+    fn smooth_stretches(&self) -> Vec<[usize; 2]> {
+        let is_jump = |station: &Station| {
+            let mut jumps = self.jumps.iter();
+            jumps.any(|at| (at - station.sigma).abs() < 1e-9)
+        };
+        let mut stretches = Vec::new();
+        let mut from = 0;
+        for k in 1..self.ends.len() {
+            if k + 1 == self.ends.len() || is_jump(&self.ends[k]) {
+                stretches.push([from, k]);
+                from = k;
+            }
+        }
+        stretches
+    }
+
+    /// The fractions of the length between which projections are linear: those of the ends of the parts, twice where
+    /// the curvature at rest jumps.
+    pub fn knots(&self) -> Vec<f64> {
+        let stretches = self.smooth_stretches().into_iter();
+        let each = stretches.flat_map(|[from, to]| &self.ends[from..=to]);
+        each.map(|station| station.sigma).collect()
+    }
+
+    /// The curvature at rest at a modulus as a function that is linear between its [knots](Stations::knots).
     pub fn linear_rest_curvature(&self, young: f64) -> Vec<DVec3> {
         self.project(&|station| station.rest_curvature(young))
     }
 
-    /// A quantity as a continuous function that is linear between the ends of the parts: that with the least integral of
-    /// the squared difference, so that the angles of a curve with this curvature are right to fourth order.
+    /// A quantity as a function that is linear between its [knots](Stations::knots), and continuous but where the
+    /// curvature at rest jumps: that with the least integral of the squared difference, so that the angles of a curve
+    /// with this curvature are right to fourth order.
     pub fn project(&self, of: &dyn Fn(&Station) -> DVec3) -> Vec<DVec3> {
-        let count = self.ends.len();
+        let stretches = self.smooth_stretches().into_iter();
+        let each = stretches.flat_map(|[from, to]| self.project_stretch(from, to, of));
+        each.collect()
+    }
+
+    /// The projection on the parts between the ends of these numbers.
+    fn project_stretch(
+        &self,
+        from: usize,
+        to: usize,
+        of: &dyn Fn(&Station) -> DVec3,
+    ) -> Vec<DVec3> {
+        let ends = &self.ends[from..=to];
+        let count = ends.len();
         let (mut diagonal, mut beside) = (vec![0.0; count], vec![0.0; count]);
         let mut right = vec![DVec3::ZERO; count];
         for e in 0..count - 1 {
-            let width = self.ends[e + 1].sigma - self.ends[e].sigma;
+            let width = ends[e + 1].sigma - ends[e].sigma;
             diagonal[e] += width / 3.0;
             diagonal[e + 1] += width / 3.0;
             beside[e] = width / 6.0;
-            for (point, station) in GAUSS_LEGENDRE_RULE.iter().zip(&self.between[e * POINTS..]) {
-                let part = (station.sigma - self.ends[e].sigma) / width;
+            let between = &self.between[(from + e) * POINTS..];
+            for (point, station) in GAUSS_LEGENDRE_RULE.iter().zip(between) {
+                let part = (station.sigma - ends[e].sigma) / width;
                 let value = width * point.weight * of(station);
                 right[e] += (1.0 - part) * value;
                 right[e + 1] += part * value;
@@ -310,9 +354,12 @@ impl Stations {
     /// The centreline without loads at a modulus, at the ends of the parts: its curvature is the one at rest.
     pub fn unloaded(&self, young: f64, base: DQuat) -> Vec<DVec3> {
         let curvature = self.linear_rest_curvature(young);
-        let sigma: Vec<f64> = self.ends.iter().map(|station| station.sigma).collect();
+        let knots = self.knots();
         let origin = self.ends[0].position;
-        let line = integrate_curvature(&sigma, &curvature, self.length, origin, base);
-        line.into_iter().map(|point| point.position).collect()
+        let line = integrate_curvature(&knots, &curvature, self.length, origin, base);
+        // Where the curvature jumps two knots are one end.
+        let is_first = |k: &usize| *k == 0 || knots[*k] > knots[*k - 1];
+        let ends = (0..knots.len()).filter(is_first);
+        ends.map(|k| line[k].position).collect()
     }
 }

@@ -10,6 +10,15 @@ pub struct PointForce {
     pub at: f64,
     /// The force.
     pub force: DVec3,
+    /// Where it is off the axis, lengths along d2 and d3 of the section there.
+    pub offset: [f64; 2],
+}
+
+impl PointForce {
+    /// Whether it acts off the axis.
+    pub fn is_off_axis(&self) -> bool {
+        self.offset != [0.0; 2] && self.force != DVec3::ZERO
+    }
 }
 
 /// A single rod with dead loads, clamped at its base and free at its tip.
@@ -81,6 +90,25 @@ impl HangingRod {
                         (a - b).abs() <= 1e-9 * a.max(b)
                     })
                 })
+    }
+
+    /// Whether forces act off the axis, whose moments depend on how the section is turned.
+    pub fn has_levers(&self) -> bool {
+        self.points.iter().any(PointForce::is_off_axis)
+    }
+
+    /// Fractions inside (0, 1) where A^-1 m jumps: with the stiffness, or with the moment by a force off the axis.
+    pub fn compliance_jumps(&self) -> Vec<f64> {
+        let levers = self.points.iter().filter(|point| point.is_off_axis());
+        let levers: Vec<f64> = levers.map(|point| point.at).collect();
+        let is_jump = |at: &f64| {
+            let stiffness_jumps = self.stiffness.iter().any(|profile| {
+                let [before, behind] = RodPlace::both_sides(*at).map(|place| profile.at(place));
+                (before - behind).abs() > 1e-9 * before.max(behind)
+            });
+            stiffness_jumps || levers.iter().any(|lever| (lever - at).abs() < 1e-9)
+        };
+        self.kinks().into_iter().filter(is_jump).collect()
     }
 
     /// Fractions inside (0, 1) where stiffness or loads have kinks or jumps.

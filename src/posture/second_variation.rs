@@ -7,6 +7,8 @@
 //!   g = integral of m . (omega x omega') + (n . omega) (t . omega) - (n . t) |omega|^2
 //! ```
 //!
+//! and of every force F that a section holds off the axis, at the lever a from it, g has
+//! (F . omega)(a . omega) - (F . a) |omega|^2 besides: the second variation of -F . (R a),
 //! with A at the modulus 1, the force n and the moment m, which do not depend on E, and omega = 0 at the base. The
 //! curvature at rest does not appear. So the Morse index at E is the number of mu > E with g omega = mu b omega, and a
 //! posture that is stable has E of at least the largest mu. (J. H. Maddocks, Arch. Ration. Mech. Anal. 85 (1984), 311,
@@ -19,7 +21,7 @@
 //! of the elements' length.
 
 use crate::numbers::GAUSS_LEGENDRE_RULE;
-use crate::posture::line::{Directors, Elements, Line, PARTIAL_INTEGRALS, POINTS};
+use crate::posture::line::{Directors, Elements, ForceOffAxis, Line, PARTIAL_INTEGRALS, POINTS};
 use glam::DVec3;
 use nalgebra::{DMatrix, DVector};
 
@@ -35,6 +37,8 @@ pub struct CriticalMode {
     pub rotation: Vec<DVec3>,
     /// d omega/dt, by the parameter.
     pub rate: Vec<DVec3>,
+    /// omega at the ends of the elements, from the base.
+    pub at_ends: Vec<DVec3>,
 }
 
 /// Values of both forms for one rotation.
@@ -112,6 +116,20 @@ impl<'a> SecondVariation<'a> {
             }
         }
         matrix += rotations.tr_mul(&loaded);
+        for lever in &line.levers {
+            let (mut turns, mut loaded) = (DMatrix::zeros(3, size), DMatrix::zeros(3, size));
+            for k in 0..lever.end * POINTS {
+                for c in 0..per {
+                    let omega = ds(k) * columns[k * per + c];
+                    let turned = lever.half_gradient(omega);
+                    for axis in 0..3 {
+                        turns[(axis, k * per + c)] = omega[axis];
+                        loaded[(axis, k * per + c)] = turned[axis];
+                    }
+                }
+            }
+            matrix += turns.tr_mul(&loaded);
+        }
         let matrix = (&matrix + matrix.transpose()) * 0.5;
         SecondVariation {
             elements,
@@ -163,6 +181,7 @@ impl<'a> SecondVariation<'a> {
             .collect();
         let mut rotation = Vec::with_capacity(count);
         let mut begin = DVec3::ZERO;
+        let mut at_ends = vec![begin];
         for element in derivative.chunks(POINTS) {
             let width = self.elements.width(rotation.len());
             for i in 0..POINTS {
@@ -176,12 +195,22 @@ impl<'a> SecondVariation<'a> {
                 * points
                     .map(|(rate, point)| point.weight * *rate)
                     .sum::<DVec3>();
+            at_ends.push(begin);
         }
         Some(CriticalMode {
             young,
             rotation,
             rate: derivative,
+            at_ends,
         })
+    }
+}
+
+impl ForceOffAxis {
+    /// Half of the gradient of (F . omega)(a . omega) - (F . a) |omega|^2.
+    fn half_gradient(&self, omega: DVec3) -> DVec3 {
+        let (force, arm) = (self.force, self.arm);
+        0.5 * (force.dot(omega) * arm + arm.dot(omega) * force) - force.dot(arm) * omega
     }
 }
 
@@ -203,6 +232,10 @@ impl CriticalMode {
             forms.bending += weight * bent / line.speed[k];
             let turned = n.dot(omega) * t.dot(omega) - n.dot(t) * omega.length_squared();
             forms.loads += weight * (m.dot(omega.cross(rate)) + line.speed[k] * turned);
+        }
+        for lever in &line.levers {
+            let omega = self.at_ends[lever.end];
+            forms.loads += omega.dot(lever.half_gradient(omega));
         }
         forms
     }

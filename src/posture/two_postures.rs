@@ -165,7 +165,7 @@ pub fn compare(a: &Posture, b: &Posture, roll: f64) -> Option<TwoPostures> {
         .collect();
     let stations_b = b.stations(false);
     let first = a.stations(false);
-    let sigma: Vec<f64> = first.ends.iter().map(|station| station.sigma).collect();
+    let sigma = first.knots();
     let length = 0.5 * (first.length + stations_b.length);
     let moments_b = stations_b.project(&|station| station.compliance);
     let unit = {

@@ -11,7 +11,7 @@ use crate::scenario::loads::{
 use crate::scenario::photo::Photo;
 use crate::scenario::profile::Profile;
 use crate::scenario::schedule::Schedule;
-use crate::scenario::section::{Moduli, Radii};
+use crate::scenario::section::{Moduli, Property, Radii, Section};
 use crate::scenario::support_motion::SupportMotion;
 use crate::scenario::supports::{BaseSupport, Grip, HeldTip};
 use crate::scenario::veins::{Rod, Scale, Tissue};
@@ -54,6 +54,9 @@ pub struct Scenario {
     pub own_gravity: Vec<[f64; 3]>,
     /// The acceleration of gravity, which pulls [`Dynamics::density`] and the masses of points.
     pub g: [f64; 3],
+    /// Whether that acceleration pulls the masses of points alone, as the mass per length is left out: motions have
+    /// the default one.
+    pub weighs_points_only: bool,
     /// Dead force per unit reference length along each vein, by components; `None` if there is none.
     pub distributed: Option<Vec<[Profile; 3]>>,
     /// Stiffness, per unit reference length, of springs along each vein that hold it in its natural place,
@@ -213,7 +216,7 @@ impl Scenario {
     /// The weight of a vein per reference length.
     pub fn weight(&self, vein: usize) -> Weight<'_> {
         let own = self.own_gravity.get(vein).copied().unwrap_or([0.0; 3]);
-        let pulls = self.g != [0.0; 3];
+        let pulls = self.g != [0.0; 3] && !self.weighs_points_only;
         Weight {
             even: [0, 1, 2].map(|axis| self.gravity[axis] + own[axis]),
             of_mass: pulls.then(|| (self.g, &self.dynamics.density[vein])),
@@ -422,6 +425,47 @@ impl Scenario {
         let width = stretch / (blade.young(rod, sigma) * thickness);
         let lever = (12.0 * vein.couple_stiffness[2].at(sigma) / stretch).sqrt();
         vec![Moduli::for_strip(width, thickness, lever)]
+    }
+
+    /// Whether sections give the stiffnesses of all rods.
+    pub(super) fn stiffnesses_follow_from_sections(&self) -> bool {
+        let sections = self.radii.sections();
+        let gives = |(rod, section): (&Rod, &Arc<Section>)| {
+            (0..3).all(|axis| {
+                rod.couple_stiffness[axis] == section.profile(Property::Couple(axis))
+                    && rod.force_stiffness[axis] == section.profile(Property::Force(axis))
+            })
+        };
+        sections.len() == self.rods.len() && self.rods.iter().zip(sections).all(gives)
+    }
+
+    /// Multiplies the moduli of all sections, and the stiffnesses that follow from them, by `to/from`. False where
+    /// sections do not give all stiffnesses: then nothing changes.
+    pub(crate) fn scale_section_moduli(&mut self, from: f64, to: f64) -> bool {
+        if !self.stiffnesses_follow_from_sections() {
+            return false;
+        }
+        let scaled = |section: &Arc<Section>| Arc::new(section.with_scaled_moduli(from, to));
+        let sections: Vec<Arc<Section>> = self.radii.sections().iter().map(scaled).collect();
+        let each = self.radii.sections().iter().zip(&sections);
+        for (vein, (before, section)) in each.enumerate() {
+            let rod = &mut self.rods[vein];
+            for axis in 0..3 {
+                rod.couple_stiffness[axis] = section.profile(Property::Couple(axis));
+                rod.force_stiffness[axis] = section.profile(Property::Force(axis));
+            }
+            let dynamics = &mut self.dynamics;
+            for (property, of_vein) in [
+                (Property::Density, &mut dynamics.density[vein]),
+                (Property::RotaryInertia, &mut dynamics.rotary_inertia[vein]),
+            ] {
+                if *of_vein == before.profile(property) {
+                    *of_vein = section.profile(property);
+                }
+            }
+        }
+        self.radii = Radii::from_sections(sections);
+        true
     }
 
     /// Young's modulus of a rod's section, or of a blade along a vein, if one of them is given and the modulus is the

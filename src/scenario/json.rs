@@ -327,6 +327,8 @@ impl Scenario {
         Some(match key {
             Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
             Key::Density if sections.is_some_and(|it| it.density) => return None,
+            // If given, it would have a weight.
+            Key::Density if self.weighs_points_only => return None,
             Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
             Key::Density => quantity_value(dynamics.density.iter()),
             // If given, it would be larger about d1.
@@ -382,16 +384,10 @@ impl Scenario {
 
     /// The sections, if they give the stiffnesses.
     fn sections(&self) -> Option<SerializedSections<'_>> {
-        let sections = self.radii.sections();
-        let gives = |(rod, section): (&Rod, &Arc<Section>)| {
-            (0..3).all(|axis| {
-                rod.couple_stiffness[axis] == section.profile(Property::Couple(axis))
-                    && rod.force_stiffness[axis] == section.profile(Property::Force(axis))
-            })
-        };
-        if sections.len() != self.rods.len() || !self.rods.iter().zip(sections).all(gives) {
+        if !self.stiffnesses_follow_from_sections() {
             return None;
         }
+        let sections = self.radii.sections();
         let give = |profiles: &[Profile], property| {
             let mut pairs = profiles.iter().zip(sections);
             pairs.all(|(profile, section)| *profile == section.profile(property))

@@ -650,11 +650,13 @@ fn check_weights(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     let Some(item) = entries.given_value(Key::G) else {
         return Ok(());
     };
-    for (rod, density) in scenario.rods.iter().zip(&scenario.dynamics.density) {
+    for (vein, rod) in scenario.rods.iter().enumerate() {
         let unit = softest_rod_scale(rod).unit(Key::Gravity, 1.0);
-        LIMITS
-            .rod_weight
-            .check(item, vector_norm(scenario.g) / unit * density.max_abs())?;
+        if let Some((g, density)) = scenario.weight(vein).of_mass {
+            LIMITS
+                .rod_weight
+                .check(item, vector_norm(g) / unit * density.max_abs())?;
+        }
     }
     Ok(())
 }

@@ -218,18 +218,31 @@ pub(super) fn read_weights(entries: &Entries, rods: usize) -> ScenarioResult<Rod
     })
 }
 
-/// Reads `load.g`, which needs a mass.
-pub(super) fn read_gravity_acceleration(entries: &Entries) -> ScenarioResult<[f64; 3]> {
+/// The acceleration of gravity, as it is read.
+pub(super) struct GravityAcceleration {
+    /// The acceleration.
+    pub g: [f64; 3],
+    /// Whether it pulls the masses of points alone.
+    pub weighs_points_only: bool,
+}
+
+/// Reads `load.g`, which needs a mass: along the veins, or on points.
+pub(super) fn read_gravity_acceleration(entries: &Entries) -> ScenarioResult<GravityAcceleration> {
     let item = entries.value_or_default(Key::G)?;
     let g = item.vector()?;
     let masses = [Key::Density, Key::MassDensity, Key::BladeMassDensity];
     let has_mass = masses.into_iter().any(|key| entries.is_given(key));
+    let points = entries.table_count("load.point").unwrap_or(0);
+    let on_points = (0..points).any(|row| entries.is_given_in_row(Key::PointMass, row));
     item.refuse_unless(
-        has_mass || g == [0.0; 3],
+        has_mass || on_points || g == [0.0; 3],
         "is an acceleration and needs the mass that it pulls: give dynamics.density, or \
-         mass_density in [section] or [blade]; a force per length is load.gravity",
+         mass_density in [section] or [blade], or masses on [[load.point]]; a force per length is load.gravity",
     )?;
-    Ok(g)
+    Ok(GravityAcceleration {
+        g,
+        weighs_points_only: !has_mass && g != [0.0; 3],
+    })
 }
 
 /// Reads loads per length of each vein; `None` if the entry is left out or zero.

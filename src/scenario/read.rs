@@ -11,7 +11,9 @@ use crate::scenario::format::item::EntryValue;
 use crate::scenario::format::source::ScenarioSource;
 use crate::scenario::format::units::Units;
 use crate::scenario::format::{Key, MissingKeyRule, ValueSchema};
-use crate::scenario::loads::{PointLoad, check_single_rod_moments, read_dynamics, read_wind};
+use crate::scenario::loads::{
+    GravityAcceleration, PointLoad, check_single_rod_moments, read_dynamics, read_wind,
+};
 use crate::scenario::photo::read_photo;
 use crate::scenario::schedule::Schedule;
 use crate::scenario::support_motion::read_support_motion;
@@ -200,7 +202,10 @@ impl Entries {
         let bases = supports::read_base_support(self, rods.len())?;
         let tissue = read_tissue(self, rods.len() - 1, &source)?;
         let weights = loads::read_weights(self, rods.len())?;
-        let g = loads::read_gravity_acceleration(self)?;
+        let GravityAcceleration {
+            g,
+            weighs_points_only,
+        } = loads::read_gravity_acceleration(self)?;
         let along = |key| loads::read_loads_along_veins(self, key, rods.len());
         let distributed = along(Key::Distributed)?;
         let foundation = along(Key::FoundationStiffness)?;
@@ -244,6 +249,7 @@ impl Entries {
             gravity: weights.shared,
             own_gravity: weights.own,
             g,
+            weighs_points_only,
             distributed,
             foundation,
             factored,

@@ -78,8 +78,8 @@ pub use crate::study::trace::{
     TraceRequest, trace, trace_through,
 };
 pub use crate::study::unbend::{
-    CriticalYoung, ModulusInterval, NamedPosture, PostureIndex, PostureOutcome, PostureRow,
-    Postures, RestCheck, SecondPosture, ShapeFormat, ShapeTableOptions, SlowLoading,
+    BladeOutline, CriticalYoung, ModulusInterval, NamedPosture, PostureIndex, PostureOutcome,
+    PostureRow, Postures, RestCheck, SecondPosture, ShapeFormat, ShapeTableOptions, SlowLoading,
     SmoothingReport, UnbendError, UnbendRemark, UnbendRequest, Unbending, read_postures,
     relax_from_points, unbend, unbend_groups, unbend_many,
 };

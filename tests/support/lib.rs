@@ -299,6 +299,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         gravity,
         own_gravity: Vec::new(),
         g: [0.0; 3],
+        weighs_points_only: false,
         distributed: None,
         foundation: None,
         factored: None,

@@ -16,7 +16,7 @@ use clap::{Args, ValueHint};
 use leafdyn::memory;
 use leafdyn::relax::Limit;
 use leafdyn::scenario::{Entries, Scenario, ScenarioError, SourceLocation, printable};
-use leafdyn::study::{BaseScenario, UnknownWord};
+use leafdyn::study::{BaseScenario, BladeOutline, UnknownWord};
 use rayon::prelude::*;
 use std::any::Any;
 use std::collections::HashMap;
@@ -44,6 +44,10 @@ pub struct ScenarioArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
 
+    /// The outline of the blade or of the section's width: a table of relative widths r at fractions s of the length, from base to tip, with the largest width of the scenario, or WIDTH
+    #[arg(long, value_name = "OUTLINE.csv[:WIDTH]", value_hint = ValueHint::FilePath)]
+    outline: Option<OutlineFile>,
+
     /// Where files go [default: out/<name of the scenario>]
     #[arg(long, value_name = "DIR", value_hint = ValueHint::DirPath)]
     out: Option<PathBuf>,
@@ -67,6 +71,45 @@ pub struct ScenarioArguments {
     /// Say what was tried and what it took: attempts, steps, factorisations, time
     #[arg(long, short)]
     verbose: bool,
+}
+
+/// A table with an outline, and the largest width if it is not that of the scenario.
+#[derive(Clone, Debug)]
+struct OutlineFile {
+    path: PathBuf,
+    width: Option<f64>,
+}
+
+impl FromStr for OutlineFile {
+    type Err = &'static str;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let width = |text: &str| text.trim().parse::<f64>().ok();
+        let (path, width) = match text.rsplit_once(':').map(|(path, end)| (path, width(end))) {
+            Some((path, Some(width))) => (path, Some(width)),
+            _ => (text, None),
+        };
+        match width {
+            Some(width) if !(width > 0.0 && width.is_finite()) => {
+                Err("the largest width must be greater than 0")
+            }
+            _ if path.is_empty() => Err("must name a file"),
+            width => Ok(OutlineFile {
+                path: path.into(),
+                width,
+            }),
+        }
+    }
+}
+
+impl OutlineFile {
+    /// The override that gives a scenario this outline.
+    fn entry(&self, scenario: &Scenario) -> Result<String, Refusal> {
+        let file = self.path.display().to_string();
+        let outline = BladeOutline::read(&leafdyn::scenario::bytes(&self.path)?, &file)?;
+        let entry = outline.entry(scenario, self.width);
+        entry.map_err(|why| format!("--outline {file}: {why}").into())
+    }
 }
 
 /// Most stations that can be requested.
@@ -229,7 +272,10 @@ impl ScenarioArguments {
 
     /// The scenarios and the other files that the verb reads.
     fn input_files<'f>(&'f self, traits: VerbTraits<'f>) -> impl Iterator<Item = &'f PathBuf> {
-        self.scenarios.iter().chain(traits.input_files)
+        let outline = self.outline.iter().map(|outline| &outline.path);
+        (self.scenarios.iter())
+            .chain(traits.input_files)
+            .chain(outline)
     }
 
     /// The folder of the table of several scenarios.
@@ -350,11 +396,13 @@ impl ScenarioArguments {
             Some("-") => ("standard input".into(), read_standard_input()?),
             _ => (path.display().to_string(), leafdyn::scenario::text(path)?),
         };
-        let base = BaseScenario::new(
-            &Entries::from_text(&text, &file)?,
-            &self.overrides,
-            traits.varies_numbers,
-        )?;
+        let entries = Entries::from_text(&text, &file)?;
+        let mut base = BaseScenario::new(&entries, &self.overrides, traits.varies_numbers)?;
+        if let Some(outline) = &self.outline {
+            let own = [outline.entry(base.scenario())?];
+            let overrides = [self.overrides.as_slice(), &own].concat();
+            base = BaseScenario::new(&entries, &overrides, traits.varies_numbers)?;
+        }
         let scenario = base.scenario().clone();
         if let Some(stations) = selection.stations {
             memory::check_station_memory(scenario.rods.len(), stations)?;

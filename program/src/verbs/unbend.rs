@@ -175,6 +175,7 @@ impl UnbendArguments {
         let request = UnbendRequest {
             young: self.young.as_ref().map(|range| range.0.clone()),
             second,
+            is_unit_known: posture.is_unit_known,
             limit: job.limit.clone(),
             ..UnbendRequest::new(
                 posture

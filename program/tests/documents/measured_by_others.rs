@@ -1,5 +1,11 @@
 //! The page on measurements of others has the numbers of the program, as it is, beside theirs.
 
+use leafdyn::posture::Posture;
+use leafdyn::posture::leaf::ScenarioRod;
+use leafdyn::posture::points::PosturePoints;
+use leafdyn::scenario::Scenario;
+use leafdyn::study::{ShapeTableOptions, read_postures};
+use leafdyn_testing::random::Draw;
 use leafdyn_testing::root;
 use leafdyn_testing::workplace::{Workplace, floats};
 use serde_json::Value;
@@ -126,4 +132,86 @@ fn the_palm_hangs_lower_than_a_straight_one() {
     shows("the bound would be {} GPa", least("narrower.csv"));
     // The modulus of the example is above the bound.
     assert!(least("palm.csv") < 1.0 && least("narrower.csv") > 1.1 * least("palm.csv"));
+}
+
+/// What twins of measured leaves came to.
+#[derive(Default)]
+struct WheatTwins {
+    all: usize,
+    /// How many intervals hold the least modulus of the leaf without noise.
+    held: usize,
+    /// How many bounds are above the modulus at which the leaf rests.
+    above: usize,
+    /// The bounds in least moduli.
+    bounds: Vec<f64>,
+    /// The noise, in mm.
+    noises: Vec<f64>,
+}
+
+fn median(values: &mut [f64]) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// Ten twins of each of the 40 leaves: the smoothed midrib is the posture of a leaf whose modulus is 1.05 to 20 times its
+/// least one, at which it rests there by its curvature at rest; its points are measured anew, with noise as was estimated
+/// of this leaf, or with this one.
+fn wheat_twins(noise: Option<f64>) -> WheatTwins {
+    let file = |name: &str| fs::read(root().join("scenarios/field").join(name)).unwrap();
+    let scenario = String::from_utf8(file("wheat.toml")).unwrap();
+    let scenario = Scenario::from_toml(&scenario).unwrap();
+    let options = ShapeTableOptions {
+        group: Some("leaf".into()),
+        ..ShapeTableOptions::default()
+    };
+    let leaves = read_postures(&file("wheat.csv"), "wheat.csv", &options, &scenario).unwrap();
+    assert_eq!(leaves.len(), 40);
+    let rod = ScenarioRod::new(&scenario).unwrap().rod;
+    let (mut draw, mut twins) = (Draw(91), WheatTwins::default());
+    for leaf in leaves {
+        let truth = Posture::from_points(rod.clone(), &leaf.points, None).unwrap();
+        let smoothed = truth.smoothing().unwrap();
+        let (least, noise) = (truth.critical_young(), noise.unwrap_or(smoothed.deviation));
+        twins.noises.push(10.0 * noise);
+        for _ in 0..10 {
+            let young = least * draw.log(1.05, 20.0);
+            let positions = smoothed.at.iter().map(|&t| {
+                let place = smoothed.curve.at(t).position;
+                place + glam::DVec3::new(noise * draw.normal(), 0.0, noise * draw.normal())
+            });
+            let points = PosturePoints::in_plane(positions.collect(), glam::DVec3::Y);
+            let found = Posture::from_points(rod.clone(), &points, None).unwrap();
+            let [low, high] = found.critical_interval();
+            twins.all += 1;
+            twins.held += usize::from(low <= least && least <= high);
+            twins.above += usize::from(low > young);
+            twins.bounds.push(low / least);
+        }
+    }
+    twins
+}
+
+#[test]
+fn twins_of_wheat_leaves_stay_below_their_modulus() {
+    for (row, noise) in [("as estimated of each leaf", None), ("of 1 mm", Some(0.1))] {
+        let mut twins = wheat_twins(noise);
+        assert_eq!(twins.all, 400);
+        let [noise, bound] = [&mut twins.noises, &mut twins.bounds].map(|it| median(it));
+        let held = 100.0 * twins.held as f64 / 400.0;
+        println!(
+            "{row}: {noise} mm, held {held} %, {} above, bound {bound}",
+            twins.above
+        );
+        shows(&format!("| {row} | {{}} mm |"), noise);
+        shows(&format!("| {row} | {noise:.2} mm | {{}} % |"), held);
+        shows(
+            &format!("| {row} | {noise:.2} mm | {held:.1} % | {{}} of 400 |"),
+            twins.above as f64,
+        );
+        let before = format!(
+            "| {row} | {noise:.2} mm | {held:.1} % | {} of 400 | {{}} |",
+            twins.above
+        );
+        shows(&before, bound);
+    }
 }

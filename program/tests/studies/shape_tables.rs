@@ -268,7 +268,7 @@ fn midribs_of_adel_are_in_centimetres() {
     refused(
         &place,
         "unbend leaf.toml --shape outline.csv --format adel",
-        &["outline", "section.width"],
+        &["outline, not a midrib", "section.width"],
     );
     place.write(
         "bare.toml",
@@ -467,5 +467,139 @@ fn rows_without_a_header_that_are_ambiguous() {
     told(
         &place,
         "leaf.toml --shape whole.csv --column 1=x:0.01 --column 2=z:0.01",
+    );
+}
+
+/// Relative widths at fractions of the length, as ADEL has them: widest at 0.35 and pointed at the tip.
+fn outline() -> Vec<[f64; 2]> {
+    let width = |s: f64| match s < 0.35 {
+        true => 1.0 - 0.3 * ((0.35 - s) / 0.35).powi(2),
+        false => 1.0 - ((s - 0.35) / 0.65).powi(2),
+    };
+    let fractions = (0..20).map(|k| f64::from(k) / 19.0);
+    // One of the fractions is that of the largest width, which is 1.
+    let largest = fractions.clone().map(width).fold(0.0, f64::max);
+    fractions.map(|s| [s, width(s) / largest]).collect()
+}
+
+/// The midrib of the first of the measured wheat leaves, in cm.
+fn wheat_midrib() -> Vec<[f64; 2]> {
+    let text = example("field/wheat.csv");
+    let rows = text.lines().filter_map(|line| line.strip_prefix("1,"));
+    let rows = rows.map(|row| {
+        let (x, y) = row.split_once(',').unwrap();
+        [x.parse().unwrap(), y.parse().unwrap()]
+    });
+    rows.collect()
+}
+
+fn outline_table(header: &str) -> String {
+    let rows = outline().into_iter().map(|[s, r]| format!("{s},{r}"));
+    format!("{header}\n{}\n", rows.collect::<Vec<_>>().join("\n"))
+}
+
+/// The area of a blade is that of its outline, and a posture is the same with the widths of the outline as with the same
+/// numbers in the scenario.
+#[test]
+fn outlines_are_widths_of_the_scenario() {
+    let place = place();
+    place.write("wheat.toml", example("field/wheat.toml"));
+    place.write("outline.csv", outline_table("s,r"));
+    place
+        .run("relax wheat.toml --outline outline.csv:1.5 --write surface --out out")
+        .ends(0);
+    let angles = place.read("out/angles.csv");
+    let rows = angles.lines().skip(1);
+    let area: f64 = rows
+        .map(|row| row.split(',').next_back().unwrap().parse::<f64>().unwrap())
+        .sum();
+    let polygon: f64 = (outline().windows(2))
+        .map(|pair| 0.5 * (pair[0][1] + pair[1][1]) * (pair[1][0] - pair[0][0]))
+        .sum();
+    assert!((area / (20.0 * 1.5 * polygon) - 1.0).abs() < 1e-3, "{area}");
+    // The largest width of the scenario is 1.7.
+    let midrib = wheat_midrib();
+    assert_eq!(midrib.len(), outline().len());
+    let points = midrib.iter().map(|[x, y]| format!("{x},{y}\n"));
+    place.write("midrib.csv", format!("x,y\n{}", points.collect::<String>()));
+    let values: Vec<f64> = outline().iter().map(|[_, r]| 1.7 * r.max(0.01)).collect();
+    let at: Vec<f64> = outline().iter().map(|[s, _]| *s).collect();
+    let set = format!("--set section.width={{at={at:?},value={values:?}}}").replace(", ", ",");
+    let wanted = least(&told(
+        &place,
+        &format!("wheat.toml --shape midrib.csv --format adel {set}"),
+    ));
+    let found = least(&told(
+        &place,
+        "wheat.toml --shape midrib.csv --format adel --outline outline.csv",
+    ));
+    assert!((found / wanted - 1.0).abs() < 1e-9, "{found} {wanted}");
+    assert!(
+        (least(&told(&place, "wheat.toml --shape midrib.csv --format adel")) / wanted - 1.0).abs()
+            > 1e-3
+    );
+    // Midrib and outline in one table, of one leaf and of several with outlines of their own.
+    let both = |leaf: usize, wider: f64| {
+        let rows = midrib.iter().zip(outline());
+        let rows = rows.map(|([x, y], [s, r])| format!("{leaf},{x},{y},{s},{}\n", r.powf(wider)));
+        rows.collect::<String>()
+    };
+    place.write("leaf.csv", format!("inerv,x,y,s,r\n{}", both(1, 1.0)));
+    let run = told(&place, "wheat.toml --shape leaf.csv --format adel");
+    assert!((least(&run) / wanted - 1.0).abs() < 1e-9);
+    assert!(
+        run["remarks"][0]
+            .as_str()
+            .unwrap()
+            .contains("r times its largest width"),
+        "{run}"
+    );
+    place.write(
+        "leaves.csv",
+        format!("inerv,x,y,s,r\n{}{}", both(1, 1.0), both(2, 0.3)),
+    );
+    let rows = place.run(
+        "unbend wheat.toml --shape leaves.csv --format adel --group inerv --json --write none",
+    );
+    let rows = rows.ends(0).json();
+    let young = |k: usize| rows["postures"][k]["critical_young"].as_f64().unwrap();
+    assert!((young(0) / wanted - 1.0).abs() < 1e-9);
+    assert!((young(1) / wanted - 1.0).abs() > 0.01);
+}
+
+#[test]
+fn outlines_that_are_none_are_refused() {
+    let place = place();
+    place.write("outline.csv", outline_table("s,r"));
+    let run = "relax leaf.toml --outline";
+    for (table, parts) in [
+        (outline_table("width,r"), &["has no columns s and r"][..]),
+        (
+            "s,r\n0,0\n0.5,1\n1,0.6\n".into(),
+            &["pointed at its tip", "1 - s"],
+        ),
+        ("s,r\n0,1\n0.5,1\n0.4,0.6\n1,0\n".into(), &["must increase"]),
+        ("s,r\n0,1\n5,1\n20,0\n".into(), &["s runs from 0 to 20"]),
+        ("s,r\n0,1\n0.5,-1\n1,0\n".into(), &["must not be negative"]),
+        (
+            "rankclass,s,r\n1,0,1\n1,1,0\n2,0,1\n2,1,0\n".into(),
+            &["several outlines", "rankclass"],
+        ),
+        ("s,r\n0,1\n0.5,\n1,0\n".into(), &["outline.csv:3", "empty"]),
+    ] {
+        place.write("outline.csv", table);
+        refused(&place, &format!("{run} outline.csv"), parts);
+    }
+    place.write("outline.csv", outline_table("s,r"));
+    refused(
+        &place,
+        &format!("{run} outline.csv:-1"),
+        &["--outline", "greater than 0"],
+    );
+    place.write("numbers.toml", example("field/palm.toml"));
+    refused(
+        &place,
+        "relax numbers.toml --outline outline.csv",
+        &["--outline outline.csv", "[section]", "[blade]"],
     );
 }

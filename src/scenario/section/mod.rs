@@ -343,6 +343,26 @@ impl Section {
         section
     }
 
+    /// This section of a material whose moduli are those of this one times `to/from`; `from` itself becomes `to`
+    /// to the last digit.
+    pub fn with_scaled_moduli(&self, from: f64, to: f64) -> Section {
+        let scaled = |modulus: &Profile| match modulus {
+            Profile::Constant(value) => Profile::Constant(to * (value / from)),
+            varying => varying.scaled(to / from),
+        };
+        let shear = match &self.shear {
+            ShearLaw::Poisson(poisson) => ShearLaw::Poisson(poisson.clone()),
+            ShearLaw::Modulus(modulus) => ShearLaw::Modulus(scaled(modulus)),
+        };
+        Section::new(
+            self.outline,
+            [self.width.clone(), self.thickness.clone()],
+            self.hollow.clone(),
+            shear,
+            [scaled(&self.young), self.mass_density.clone()],
+        )
+    }
+
     fn profiles(&self) -> impl Iterator<Item = &Profile> {
         let Section {
             width,

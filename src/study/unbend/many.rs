@@ -75,7 +75,11 @@ pub fn unbend_groups(
             young: young.clone(),
             check: false,
             slow_loading: false,
-            ..UnbendRequest::new(scenario.clone(), leaf.points.clone())
+            is_unit_known: leaf.is_unit_known,
+            ..UnbendRequest::new(
+                leaf.scenario.as_deref().unwrap_or(scenario).clone(),
+                leaf.points.clone(),
+            )
         })
         .collect();
     let found = unbend_many(&requests);

@@ -4,6 +4,7 @@
 //! [`crate::posture`]; here are the tables of points, the comparison with relaxations, and the result.
 
 mod many;
+mod outline;
 mod request;
 mod result;
 mod shape_formats;
@@ -13,6 +14,7 @@ mod start;
 mod table;
 
 pub use crate::study::unbend::many::{PostureOutcome, PostureRow, Postures, unbend_groups};
+pub use crate::study::unbend::outline::BladeOutline;
 pub use crate::study::unbend::request::{SecondPosture, UnbendError, UnbendRequest};
 pub use crate::study::unbend::result::{
     CriticalYoung, ModulusInterval, PostureIndex, RestCheck, SlowLoading, SmoothingReport,

@@ -27,6 +27,8 @@ pub struct UnbendRequest {
     pub young: Option<RangeInclusive<f64>>,
     /// The same leaf in another posture.
     pub second: Option<SecondPosture>,
+    /// Whether the unit of the points is known, so that their length may be any.
+    pub is_unit_known: bool,
     /// Whether the scenario that rests in the posture is relaxed from there.
     pub check: bool,
     /// Whether slow loading is tried at several moduli.
@@ -68,6 +70,7 @@ impl UnbendRequest {
             points,
             young: None,
             second: None,
+            is_unit_known: false,
             check: true,
             slow_loading: true,
             limit: Limit::default(),

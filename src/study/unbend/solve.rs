@@ -44,6 +44,8 @@ pub fn unbend(request: &UnbendRequest) -> Result<Unbending, UnbendError> {
     let of = ScenarioRod::new(&request.scenario)?;
     let base = Some(of.base);
     let posture = Posture::from_points(of.rod.clone(), &request.points, base)?;
+    // Points out of order are longer than their leaf, too.
+    check_units(request)?;
     let compared = match &request.second {
         Some(second) => {
             let other = Posture::from_points(of.rod.clone(), &second.points, base)
@@ -54,6 +56,20 @@ pub fn unbend(request: &UnbendRequest) -> Result<Unbending, UnbendError> {
         None => None,
     };
     Ok(describe(request, of, posture, compared, clock))
+}
+
+/// Refuses points that are probably not in the unit of the scenario.
+fn check_units(request: &UnbendRequest) -> Result<(), UnbendError> {
+    if request.is_unit_known {
+        return Ok(());
+    }
+    let given = request.scenario.rods[0].length;
+    let meters = request.scenario.units.meters();
+    request.points.check_unit(given, meters)?;
+    match &request.second {
+        Some(second) => (second.points.check_unit(given, meters)).map_err(UnbendError::Second),
+        None => Ok(()),
+    }
 }
 
 /// Several postures, side by side; a posture that cannot be used is an error of its own.

@@ -7,6 +7,7 @@ use crate::study::fit::columns::{
     DataFileOptions, EXPERIMENT_NAME_COLUMN, FitError, MeasuredColumn, NORMAL_COLUMNS,
 };
 use crate::study::fit::table::{DataTable, KnownColumns};
+use crate::study::unbend::outline::BladeOutline;
 use crate::study::unbend::shape_formats::{ShapeFormat, deeplabcut_points};
 use crate::study::unbend::sheet::read_field_sheet;
 use glam::DVec3;
@@ -37,7 +38,9 @@ pub struct NamedPosture {
     pub points: PosturePoints,
     /// What coordinates were taken for, where that is not what their names say.
     pub taken: Option<String>,
-    /// The scenario with the sections and the weight that the table has besides the points, if it has.
+    /// Whether the format of the table says the unit of the points.
+    pub is_unit_known: bool,
+    /// The scenario with what the table has besides the points, if it has: sections and weight, or the outline.
     pub scenario: Option<Box<Scenario>>,
 }
 
@@ -86,6 +89,7 @@ pub fn read_postures(
                  modulus in GPa"
                     .into(),
             ),
+            is_unit_known: true,
             scenario: Some(Box::new(sheet.scenario(file, scenario)?)),
         }]);
     }
@@ -175,6 +179,12 @@ fn read_points(
             "a normal has three components: give normal_x, normal_y and normal_z, or none of them";
         return Err(line_error(file, table.header_line, why));
     }
+    // Leaves of ADEL may have their outline beside the midrib.
+    let outline = match (table.column_index("s"), table.column_index("r")) {
+        (Some(s), Some(r)) if is_adel => Some([s, r]),
+        _ => None,
+    };
+    let mut outlines: Vec<Vec<[f64; 2]>> = Vec::new();
     let mut found: Vec<NamedPosture> = Vec::new();
     for row in 0..table.row_count() {
         let number = |column: usize| -> Result<f64, FitError> {
@@ -224,10 +234,15 @@ fn read_points(
                     ..PosturePoints::default()
                 },
                 taken: taken.map(String::from),
+                is_unit_known: is_adel,
                 scenario: None,
             });
+            outlines.push(Vec::new());
             found.len() - 1
         });
+        if let Some([s, r]) = outline {
+            outlines[at].push([number(s)?, number(r)?]);
+        }
         let points = &mut found[at].points;
         points.positions.push(position);
         if let (Some(all), [Some(x), Some(y), Some(z)]) = (&mut points.normals, normals) {
@@ -241,6 +256,17 @@ fn read_points(
             })?);
         }
     }
+    if outline.is_some() {
+        for (leaf, rows) in found.iter_mut().zip(&outlines) {
+            add_outline(leaf, rows, scenario).map_err(|why| {
+                let of = match leaf.name.as_str() {
+                    "" => String::new(),
+                    name => format!("leaf {name}: "),
+                };
+                line_error(file, table.header_line, format!("{of}{why}"))
+            })?;
+        }
+    }
     // Deviations in a photograph are those of pixels.
     if let (Coordinates::Photo(_), Some(photo)) = (&coordinates, &scenario.photo) {
         for leaf in &mut found {
@@ -252,13 +278,28 @@ fn read_points(
     Ok(found)
 }
 
+/// Gives a leaf the outline through its pairs of s and r, if the width of its section counts.
+fn add_outline(
+    leaf: &mut NamedPosture,
+    rows: &[[f64; 2]],
+    scenario: &Scenario,
+) -> Result<(), String> {
+    let outline = BladeOutline::new(rows)?;
+    let Some(with_outline) = outline.outlined(scenario) else {
+        return Ok(());
+    };
+    leaf.scenario = Some(Box::new(with_outline?));
+    leaf.taken = Some("the width of the section is r times its largest width".into());
+    Ok(())
+}
+
 /// A centimeter, the unit of ADEL's midribs, in the scenario's unit of length; refuses outlines, and several leaves that
 /// nothing tells apart.
 fn check_midribs(table: &DataTable, has_group: bool, scenario: &Scenario) -> Result<f64, FitError> {
     let refuse = |why: String| Err(line_error(table.file, table.header_line, why));
     if table.column_index("x").is_none() && table.column_index("r").is_some() {
         return refuse(
-            "has s and r: it is an outline, not a midrib; its widths belong to the scenario, as section.width = \
+            "has s and r: it is an outline, not a midrib; it belongs to the scenario, as its outline or as section.width = \
              { at = [s ..], value = [r times the largest width ..] }"
                 .into(),
         );

@@ -3,6 +3,8 @@
 
 mod closed_forms;
 mod noisy_points;
+mod off_axis;
+mod point_weights;
 mod refused;
 mod relaxed;
 mod two_postures;

@@ -2,7 +2,7 @@
 
 use super::*;
 use leafdyn::posture::points::{PostureError, PosturePoints};
-use leafdyn::study::{UnbendRequest, unbend};
+use leafdyn::study::{SecondPosture, UnbendRequest, unbend};
 use leafdyn_testing::{ROD, parse};
 
 fn points() -> PosturePoints {
@@ -109,6 +109,51 @@ fn points_that_are_no_posture() {
     assert!(why.contains("in one place"), "{why}");
     let why = changed(&|points| points[3].x = f64::NAN);
     assert!(why.contains("point 4") && why.contains("finite"), "{why}");
+}
+
+/// Points in another unit than the scenario's, whose name is told if the scenario's is known.
+#[test]
+fn points_in_another_unit() {
+    let weight = "load = { gravity = [0.0, 0.0, -1.0] }";
+    let named = |unit: &str| parse(&format!("{ROD}{weight}\nunits = {{ length = \"{unit}\" }}"));
+    let scaled = |factor: f64| {
+        let mut points = points();
+        points.positions.iter_mut().for_each(|it| *it *= factor);
+        points
+    };
+    for (unit, factor, guess) in [
+        ("cm", 10.0, "in mm?"),
+        ("m", 100.0, "in cm?"),
+        ("cm", 0.01, "in m?"),
+        ("furlong", 10.0, "in another unit?"),
+    ] {
+        let why = refusal(&named(unit), scaled(factor));
+        assert!(
+            why.contains(guess) && why.contains("x=x:0.1") && why.contains("leaf.length"),
+            "{why}"
+        );
+    }
+    for factor in [7.9, 1.0 / 7.9] {
+        assert!(unbend(&UnbendRequest::new(named("cm"), scaled(factor))).is_ok());
+    }
+    let second = UnbendRequest {
+        second: Some(SecondPosture {
+            points: scaled(10.0),
+            roll: 0.0,
+        }),
+        ..UnbendRequest::new(named("cm"), points())
+    };
+    let why = unbend(&second).unwrap_err().to_string();
+    assert!(
+        why.starts_with("second posture") && why.contains("in mm?"),
+        "{why}"
+    );
+    // A format that has a unit may have leaves of any length.
+    let known = UnbendRequest {
+        is_unit_known: true,
+        ..UnbendRequest::new(named("cm"), scaled(10.0))
+    };
+    assert!(unbend(&known).is_ok());
 }
 
 /// A flat section on a line in space needs its normals; what is nearly in an upright plane is put there.
