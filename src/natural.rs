@@ -128,7 +128,7 @@ impl StepEnd {
             let q = combine(&slopes, STAGE_WEIGHTS[i]).rotation.normalize();
             let end = self.sigma + width;
             let at = RodPlace::within(self.sigma + STAGE_NODES[i] * width, [self.sigma, end]);
-            let u = DVec3::from_array(Profile::values_of_three(&rod.rest_curvature, at));
+            let u = DVec3::from_array(Profile::values_of_three(rod.rest_curvature.each_ref(), at));
             let spin = 0.5 * rod.length * u;
             let stretch = if grown { rod.rest_stretch.at(at) } else { 1.0 };
             slopes[i] = Pose {

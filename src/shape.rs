@@ -59,6 +59,23 @@ pub struct NodeState {
     pub m: DVec3,
 }
 
+impl NodeState {
+    /// The mirror image in the plane z = 0, whose directors d1 and d2 are those of the image, and d3 opposite.
+    pub(crate) fn mirrored_in_base_plane(&self) -> NodeState {
+        let polar = |a: DVec3| DVec3::new(a.x, a.y, -a.z);
+        let axial = |a: DVec3| DVec3::new(-a.x, -a.y, a.z);
+        let DQuat { x, y, z, w } = self.rotation;
+        NodeState {
+            position: polar(self.position),
+            rotation: DQuat::from_xyzw(-x, -y, z, w),
+            v: polar(self.v),
+            u: axial(self.u),
+            n: polar(self.n),
+            m: axial(self.m),
+        }
+    }
+}
+
 /// The shape of one rod.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RodShape {

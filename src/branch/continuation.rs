@@ -105,6 +105,9 @@ pub struct ContinuationOptions<'a> {
     pub critical_grids: usize,
     /// Stops the branch once it returns true.
     pub stop_criterion: Option<&'a StopCriterion<'a>>,
+    /// Of so many points in a row between which the index does not change one is verified on finer grids; the
+    /// others are left out of the branch.
+    pub points_per_verification: usize,
 }
 
 impl ContinuationOptions<'_> {
@@ -116,6 +119,7 @@ impl ContinuationOptions<'_> {
             max_points: most,
             critical_grids: CRITICAL_GRIDS,
             stop_criterion: None,
+            points_per_verification: 1,
         }
     }
 }
@@ -268,6 +272,32 @@ impl Branch {
             .chain(&mut self.unmatched_vertices)
         {
             *after -= usize::from(*after >= number);
+        }
+    }
+
+    /// Drops points after the first `verified` ones, so that one remains of so many in a row. The last one
+    /// remains, as do those beside a change of the index and next to these.
+    pub fn thin_points(&mut self, verified: usize, points_per_verification: usize) {
+        let mut number = verified.max(1);
+        let mut dropped = 0;
+        while number + 2 < self.points.len() {
+            let index = self.points[number].index;
+            let around = &self.points[number - 1..number + 3];
+            let is_even = around.iter().all(|point| point.index == index);
+            let unlocated = [number - 1, number].iter().any(|it| {
+                self.unlocated_index_changes.contains(it) || self.unmatched_vertices.contains(it)
+            });
+            if dropped + 1 < points_per_verification
+                && is_even
+                && !unlocated
+                && !self.is_near_critical(number)
+            {
+                self.drop_point(number);
+                dropped += 1;
+            } else {
+                number += 1;
+                dropped = 0;
+            }
         }
     }
 

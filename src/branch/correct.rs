@@ -7,13 +7,13 @@ use crate::branch::equations::{
     LARGEST_CORRECTOR_INCREMENT, factorize_matrix, has_converged,
 };
 use crate::branch::family::{
-    CompletedIncrements, OutOfRange, force_parameter_derivative, place_supports,
+    CompletedIncrements, OutOfRange, force_parameter_derivative, place_supports, unbalanced_forces,
 };
 use crate::branch::points::{
     BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, dot, increments_between,
     inject_forces, is_finite, largest, scale_field, scaled_sum,
 };
-use crate::leaf::{DiscreteLeaf, LinearSolveOutcome, NodalField, State, System};
+use crate::leaf::{DiscreteLeaf, LinearSolveOutcome, MatrixFactors, NodalField, State, System};
 use crate::newton::ForceConvergence;
 use crate::numbers::larger;
 use crate::relax::NOISY_EIGENVALUE_THRESHOLD;
@@ -79,16 +79,31 @@ impl ArclengthConstraint {
     }
 }
 
-/// Solutions of the equations of a branch at a state.
+/// The equations linearized at a state, and their solutions.
+pub(super) struct LinearizedState {
+    /// The derivative of the forces with respect to the parameter, and the rate of the increments with it.
+    forces_rate: NodalField,
+    rate: NodalField,
+    /// The factors of the matrix, if that was factorized directly.
+    factors: Option<MatrixFactors>,
+    /// The number of negative eigenvalues, if it was counted.
+    index: Option<usize>,
+    /// How far Newton's method has moved since from the state, and from that whose eigenvalues were counted (radians,
+    /// lengths, fractions).
+    moved: f64,
+    moved_since_count: f64,
+}
+
+/// At a distance up to this (radians, lengths, fractions) from a state the equations linearized there still hold:
+/// an iteration with them gains seven digits, and a tangent misses no more by them than by the differences that the
+/// rates are.
+const NEARBY_STATE: f64 = 1e-7;
+
+/// Increments that balance the forces at a state, and the forces of the segments that complete the law
+/// of nearly rigid ones in them.
 struct CorrectorStep {
-    /// The increments that balance the forces, and the forces of the segments that complete the law
-    /// of nearly rigid ones in them.
     forces: NodalField,
     law_forces: Vec<DVec3>,
-    /// The rate of the increments with the parameter.
-    rate: NodalField,
-    /// The number of negative eigenvalues, if the factorization counts them.
-    counted: Option<usize>,
 }
 
 impl BranchEquations<'_> {
@@ -118,10 +133,20 @@ impl BranchEquations<'_> {
         &mut self,
         at: &ParametrizedState,
         linear: &AssembledForces,
-        rate: &NodalField,
-    ) -> Result<CorrectorStep, CorrectorFailure> {
+        forces_rate: NodalField,
+    ) -> Result<(CorrectorStep, LinearizedState), CorrectorFailure> {
         let shift = linear.shift;
         self.factorizations += 1;
+        let linearized = |rate, forces_rate, factors: Option<MatrixFactors>| LinearizedState {
+            forces_rate,
+            rate,
+            index: factors
+                .as_ref()
+                .map(MatrixFactors::negative_eigenvalue_count),
+            factors,
+            moved: 0.0,
+            moved_since_count: 0.0,
+        };
         if self.solves_rod_by_rod {
             if self.system.factorize(shift) {
                 let mut solved = |system: &mut System, rhs: &NodalField| {
@@ -129,31 +154,84 @@ impl BranchEquations<'_> {
                     let found = system.solve(None, CG_TOLERANCE);
                     matches!(found, LinearSolveOutcome::Converged(_)).then(|| system.solution())
                 };
-                let found = [&linear.forces, rate].map(|rhs| solved(&mut self.system, rhs));
+                let found = [&linear.forces, &forces_rate].map(|rhs| solved(&mut self.system, rhs));
                 if let [Some(mut forces), Some(rate)] = found {
                     let completion = self.complete_law(at, &mut forces, &mut solved)?;
-                    return Ok(CorrectorStep {
+                    let step = CorrectorStep {
                         forces,
                         law_forces: completion.segment_forces,
-                        rate,
-                        counted: None,
-                    });
+                    };
+                    return Ok((step, linearized(rate, forces_rate, None)));
                 }
             }
             self.solves_rod_by_rod = false;
             self.factorizations += 1;
         }
         let pattern = self.pattern(0)?;
-        let mut factor = factorize_matrix(&pattern, &self.system, shift)?;
-        let mut solved = |rhs: &NodalField| factor.solve_bordered(rhs, &[]).increments;
-        let [mut forces, rate] = [&linear.forces, rate].map(&mut solved);
+        let mut factors = factorize_matrix(&pattern, &self.system, shift)?;
+        let rate = factors.solve_bordered(&forces_rate, &[]).increments;
+        let step = self.balance(at, &linear.forces, &mut factors)?;
+        Ok((step, linearized(rate, forces_rate, Some(factors))))
+    }
+
+    /// The increments by factors of the matrix that balance the forces assembled at a state.
+    fn balance(
+        &mut self,
+        at: &ParametrizedState,
+        forces: &NodalField,
+        factors: &mut MatrixFactors,
+    ) -> Result<CorrectorStep, CorrectorFailure> {
+        let mut solved = |rhs: &NodalField| factors.solve_bordered(rhs, &[]).increments;
+        let mut forces = solved(forces);
         let completion = self.complete_law(at, &mut forces, &mut |_, rhs| Some(solved(rhs)))?;
         Ok(CorrectorStep {
             forces,
             law_forces: completion.segment_forces,
-            rate,
-            counted: Some(factor.negative_eigenvalue_count()),
         })
+    }
+
+    /// Newton's step at a state, by the equations linearized there or, if these are known, near it.
+    fn corrector_step(
+        &mut self,
+        now: &mut ParametrizedState,
+        known: &mut Option<LinearizedState>,
+    ) -> Result<(CorrectorStep, LinearizedState), CorrectorFailure> {
+        // The factors take most of the memory, and other ones are next.
+        let near = known.take().filter(|near| near.moved < NEARBY_STATE);
+        match near {
+            Some(mut near) => match near.factors.take() {
+                Some(mut factors) => {
+                    let leaf = self.leaves.leaf_at(now.params)?;
+                    place_supports(leaf, &mut now.state);
+                    let forces = unbalanced_forces(leaf, &now.state, &mut self.system);
+                    let step = self.balance(now, &forces, &mut factors)?;
+                    near.factors = Some(factors);
+                    Ok((step, near))
+                }
+                None => {
+                    let linear = self.assemble(now, false)?;
+                    let (step, solved) = self.solve(now, &linear, near.forces_rate)?;
+                    let linearized = match solved.index {
+                        Some(_) => LinearizedState {
+                            moved: near.moved,
+                            ..solved
+                        },
+                        None => LinearizedState {
+                            moved: near.moved,
+                            index: near.index,
+                            moved_since_count: near.moved_since_count,
+                            ..solved
+                        },
+                    };
+                    Ok((step, linearized))
+                }
+            },
+            None => {
+                let forces_rate = self.parameter_derivatives(now, false)?.swap_remove(0);
+                let linear = self.assemble(now, false)?;
+                self.solve(now, &linear, forces_rate)
+            }
+        }
     }
 
     /// Newton corrector: back to the branch within the plane normal to `normal`
@@ -185,6 +263,17 @@ impl BranchEquations<'_> {
         fraction: f64,
         plane: Option<&ArclengthConstraint>,
     ) -> Result<EquilibriumPoint, CorrectorFailure> {
+        self.correct_from(state, fraction, plane, &mut None)
+    }
+
+    /// As [`BranchEquations::correct_within`], with the equations as they are, or become, known at a state nearby.
+    pub(super) fn correct_from(
+        &mut self,
+        state: &State,
+        fraction: f64,
+        plane: Option<&ArclengthConstraint>,
+        known: &mut Option<LinearizedState>,
+    ) -> Result<EquilibriumPoint, CorrectorFailure> {
         let mut now = ParametrizedState {
             state: state.clone(),
             params: [fraction],
@@ -193,14 +282,10 @@ impl BranchEquations<'_> {
         let mut progress = None;
         for iterations in 1.. {
             self.check_limit()?;
-            let rates = self.parameter_derivatives(&now, false)?;
-            let linear = self.assemble(&mut now, false)?;
-            let CorrectorStep {
-                forces,
-                law_forces,
-                mut rate,
-                counted,
-            } = self.solve(&now, &linear, &rates[0])?;
+            let (CorrectorStep { forces, law_forces }, linearized) =
+                self.corrector_step(&mut now, known)?;
+            let mut rate = linearized.rate.clone();
+            let linearized = known.insert(linearized);
             if let Some(held) = self.support_position_rate(&now.state, now.params[0])? {
                 add_scaled(&mut rate, 1.0, &held);
             }
@@ -214,6 +299,8 @@ impl BranchEquations<'_> {
             if !is_finite(&increments) || !step.is_finite() || size > LARGEST_CORRECTOR_INCREMENT {
                 return Err(CorrectorFailure::NotConverged);
             }
+            linearized.moved += size;
+            linearized.moved_since_count += size;
             now.params[0] += step;
             let completed = CompletedIncrements {
                 increments: &increments,
@@ -233,10 +320,11 @@ impl BranchEquations<'_> {
                     params: [1.0],
                 });
                 // The factorized matrix is that of the previous state.
-                let index = match counted {
-                    Some(index) if size < INDEX_PRESERVING_STEP => index,
+                let index = match linearized.index {
+                    Some(index) if linearized.moved_since_count < INDEX_PRESERVING_STEP => index,
                     _ => self.index(&now)?,
                 };
+                (linearized.index, linearized.moved_since_count) = (Some(index), 0.0);
                 return Ok(EquilibriumPoint {
                     state: now.state,
                     fraction: now.params[0],

@@ -147,7 +147,10 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
 
     /// The equations of the same leaves on the grid with all segments halved.
     pub fn refined(&self) -> Self {
-        BranchEquations::from_leaves(self.leaves.refined())
+        BranchEquations {
+            solves_rod_by_rod: self.solves_rod_by_rod,
+            ..BranchEquations::from_leaves(self.leaves.refined())
+        }
     }
 
     /// Lets the matrices of leaves with this additional compliance determine what is singular:

@@ -1,7 +1,8 @@
 //! A family of leaves that differ in one parameter, or in two.
 //!
-//! Its leaves on a grid and the sparsity patterns of their matrices are cached, as making them
-//! costs more than solving the equations of a small leaf. Forces on a state are differenced over
+//! Its leaves, these on a grid, and the sparsity patterns of their matrices are cached, as making them
+//! costs more than solving the equations of a small leaf. What a leaf on a grid has in common with
+//! another one of the family is made once for each grid. Forces on a state are differenced over
 //! the parameter, and a state is displaced by increments, with the supports where the leaf at
 //! the new value of the parameter has them.
 
@@ -13,7 +14,7 @@ use crate::run::Limit;
 use crate::scenario::Scenario;
 use glam::DVec3;
 use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Up to this stiffness in stretch and shear, in units of A/L^2, the matrix is that of the leaf:
 /// tangents and signs of eigenvalues are exact. The forces of stiffer, nearly rigid segments are
@@ -48,6 +49,10 @@ pub struct LeafFamily<'a, const N: usize = 1> {
     coupled: Leaf,
     /// Sparsity patterns of the matrices of the leaves.
     pub patterns: Arc<SparsityPatternCache>,
+    /// Leaves that were needed last.
+    leaves: Arc<Mutex<LruCache<[f64; N], Leaf, SHARED_LEAVES>>>,
+    /// The leaf of `coupled` on the grids that were needed last.
+    discretized: Arc<Mutex<VecDeque<Arc<DiscreteLeaf>>>>,
     /// When branches of these leaves are followed no further: every Newton iteration checks it.
     pub limit: Limit,
 }
@@ -159,6 +164,8 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
             coupled: coupled.unwrap_or(&ends[1]).clone(),
             first: ends[0].clone(),
             patterns: Arc::default(),
+            leaves: Arc::default(),
+            discretized: Arc::default(),
             limit: Limit::default(),
         })
     }
@@ -200,26 +207,59 @@ impl<'a, const N: usize> LeafFamily<'a, N> {
 
     /// The scenario at fractions of the ranges.
     pub fn scenario(&self, params: [f64; N]) -> Result<Scenario, OutOfRange> {
-        (self.make_scenario)(self.values(params)).map_err(OutOfRange)
+        Ok(self.leaf(params)?.scenario().clone())
     }
 
     /// The leaf at fractions of the ranges.
     pub fn leaf(&self, params: [f64; N]) -> Result<Leaf, OutOfRange> {
-        Ok(Leaf::with_scale(
-            Arc::new(self.scenario(params)?),
-            self.scale(),
-        ))
+        // Another thread need not wait while one makes a leaf.
+        let known = locked(&self.leaves).get(params).cloned();
+        if let Some(known) = known {
+            return Ok(known);
+        }
+        let scenario = (self.make_scenario)(self.values(params)).map_err(OutOfRange)?;
+        let leaf = Leaf::with_scale(Arc::new(scenario), self.scale());
+        locked(&self.leaves).insert(params, leaf.clone());
+        Ok(leaf)
     }
 
     /// A system of equations for all its leaves on a grid.
     pub fn system(&self, grid: &Grid) -> System {
-        System::new(&discretize_leaf(&self.coupled, grid, None))
+        System::new(&self.common_leaf(grid))
+    }
+
+    /// A leaf of the family on a grid, from which others take what they have in common with it.
+    fn common_leaf(&self, grid: &Grid) -> Arc<DiscreteLeaf> {
+        let known = (locked(&self.discretized).iter())
+            .find(|known| known.grid == *grid)
+            .cloned();
+        known.unwrap_or_else(|| {
+            let made = DiscreteLeaf::new(&self.coupled, grid.clone());
+            let made = Arc::new(with_condensing_limits(made, None));
+            let mut all = locked(&self.discretized);
+            all.truncate(CACHED_GRIDS - 1);
+            all.push_front(made.clone());
+            made
+        })
     }
 }
 
-/// A leaf on a grid, if requested softened: see [`Leaves::with_regularization`].
-fn discretize_leaf(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> DiscreteLeaf {
-    let mut discrete = DiscreteLeaf::new(leaf, grid.clone());
+/// Number of cached leaves of a family: those of differences on all grids of the points that several threads
+/// verify.
+const SHARED_LEAVES: usize = 24;
+
+/// Number of grids on which one leaf of a family is cached.
+const CACHED_GRIDS: usize = 8;
+
+/// The content of a cache. What a thread that panicked has left is complete.
+fn locked<T>(cache: &Mutex<T>) -> MutexGuard<'_, T> {
+    cache.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// A leaf with the stiffnesses with which the forces of its segments are condensed out on branches; if requested
+/// softened: see [`Leaves::with_regularization`].
+fn with_condensing_limits(mut discrete: DiscreteLeaf, softening: Option<f64>) -> DiscreteLeaf {
+    let leaf = &discrete.leaf;
     // A/L^2 of this leaf, in the units of the family.
     let own = leaf.scenario().scale().force() / leaf.scale.force();
     for section in &mut discrete.sections {
@@ -237,15 +277,25 @@ fn discretize_leaf(leaf: &Leaf, grid: &Grid, softening: Option<f64>) -> Discrete
     discrete
 }
 
-/// A leaf on a grid, with the sections of another leaf on this grid if its rods are the same.
-fn discretize_reusing_sections(
-    other: Option<&DiscreteLeaf>,
+/// A leaf of a family on a grid, with what it has in common with the `last` one and with another one of the
+/// family there.
+fn discretize_leaf<const N: usize>(
+    family: &LeafFamily<N>,
+    last: Option<&DiscreteLeaf>,
     leaf: &Leaf,
     grid: &Grid,
     softening: Option<f64>,
 ) -> DiscreteLeaf {
-    let copied = other.and_then(|other| other.with_same_rods(leaf));
-    copied.unwrap_or_else(|| discretize_leaf(leaf, grid, softening))
+    if let Some(copied) = last.and_then(|last| last.with_same_rods(leaf)) {
+        return copied;
+    }
+    let common = family.common_leaf(grid);
+    // Its segments are not softened.
+    let copied = match softening {
+        None => common.with_same_rods(leaf),
+        Some(_) => None,
+    };
+    copied.unwrap_or_else(|| with_condensing_limits(common.with_same_rest_shapes(leaf), softening))
 }
 
 /// Leaves of a family on one grid. The last few are cached: iterations
@@ -285,7 +335,7 @@ impl<'a, const N: usize> Leaves<'a, N> {
     pub fn refined(&self) -> Self {
         let (grid, softening) = (self.grid.refined(), self.regularization);
         let finer = |before: Option<&DiscreteLeaf>, coarse: &DiscreteLeaf| {
-            discretize_reusing_sections(before, &coarse.leaf, &grid, softening)
+            discretize_leaf(self.family, before, &coarse.leaf, &grid, softening)
         };
         Leaves {
             cache: self.cache.map(finer),
@@ -299,12 +349,8 @@ impl<'a, const N: usize> Leaves<'a, N> {
     pub fn leaf_at(&mut self, params: [f64; N]) -> Result<&DiscreteLeaf, OutOfRange> {
         let (family, grid, softening) = (self.family, &self.grid, self.regularization);
         self.cache.get_or_make(params, |last| {
-            Ok(discretize_reusing_sections(
-                last,
-                &family.leaf(params)?,
-                grid,
-                softening,
-            ))
+            let leaf = family.leaf(params)?;
+            Ok(discretize_leaf(family, last, &leaf, grid, softening))
         })
     }
 }
@@ -332,14 +378,25 @@ impl<K: Copy + PartialEq, V, const MOST: usize> LruCache<K, V, MOST> {
         key: K,
         make: impl FnOnce(Option<&V>) -> Result<V, E>,
     ) -> Result<&V, E> {
-        let known = self.0.iter().position(|(other, _)| *other == key);
-        let found = match known.and_then(|index| self.0.remove(index)) {
-            Some((_, value)) => value,
-            None => make(self.0.front().map(|(_, value)| value))?,
-        };
-        self.0.truncate(MOST - 1);
-        self.0.push_front((key, found));
+        if self.get(key).is_none() {
+            let made = make(self.0.front().map(|(_, value)| value))?;
+            self.insert(key, made);
+        }
         Ok(&self.0[0].1)
+    }
+
+    /// The value of a key, if it is cached.
+    fn get(&mut self, key: K) -> Option<&V> {
+        let known = self.0.iter().position(|(other, _)| *other == key)?;
+        let found = self.0.remove(known)?;
+        self.0.push_front(found);
+        self.0.front().map(|(_, value)| value)
+    }
+
+    /// Caches the value of a key that is not cached.
+    fn insert(&mut self, key: K, value: V) {
+        self.0.truncate(MOST - 1);
+        self.0.push_front((key, value));
     }
 
     /// Values derived from these, under the same keys; `other` takes the one made before, too.
@@ -378,7 +435,7 @@ impl SparsityPatternCache {
             coupled: system.coupled(),
             border_rows: border,
         };
-        let mut cache = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut cache = locked(&self.0);
         let made = |_: Option<&_>| DirectSolver::with_border(system, border).map(Arc::new);
         cache.get_or_make(shape, made).ok().cloned()
     }

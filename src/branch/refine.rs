@@ -134,10 +134,11 @@ fn correct_to_rounding(
     fraction: f64,
     plane: Option<&ArclengthConstraint>,
 ) -> Result<ConvergedPoint, CorrectorFailure> {
-    let mut found = equations.correct_within(state, fraction, plane)?;
+    let mut linearized = None;
+    let mut found = equations.correct_from(state, fraction, plane, &mut linearized)?;
     let mut unfinished = f64::INFINITY;
     for _ in 0..MAX_EXTRA_ITERATIONS {
-        let next = equations.correct_within(&found.state, found.fraction, plane)?;
+        let next = equations.correct_from(&found.state, found.fraction, plane, &mut linearized)?;
         unfinished = found.state.largest_displacement_to(&next.state);
         found = next;
         if unfinished < FINAL_ITERATION_DISPLACEMENT {

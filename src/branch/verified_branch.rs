@@ -131,11 +131,13 @@ impl<'a> NestedBranchEquations<'a> {
             beyond: Vec::new(),
         };
         let (mut ahead, mut tries) = (BUDGET.largest_batch / 2, 0);
+        let mut points_per_verification = how.points_per_verification;
         loop {
             let now = &known.branch.points[known.branch.points.len() - 1];
             let (before, now) = (known.points.len(), now.state.clone());
             let equations = self.on_grid_of(&now);
             (known.branch).extend_to(equations, how, before + ahead, progress);
+            known.branch.thin_points(before, points_per_verification);
             let leaves = &equations.leaves;
             let doubt = known.verify(leaves.family, &leaves.grid, accuracy, how.critical_grids);
             if known.points.len() > before {
@@ -165,6 +167,8 @@ impl<'a> NestedBranchEquations<'a> {
                 }
             }
             let end = known.branch.end.clone();
+            // How far the branch is known shall not depend on which points are left out.
+            points_per_verification = 1;
             ahead = BUDGET.least_batch;
             tries += 1;
             let last = known.points.len().saturating_sub(1);

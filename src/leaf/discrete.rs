@@ -117,25 +117,46 @@ pub struct NodeWeights {
 impl DiscreteLeaf {
     /// Discretizes `leaf` on `grid`.
     pub fn new(leaf: &Leaf, grid: Grid) -> Self {
-        let n = grid.segments();
-        let mut sections: Vec<Section> = (0..leaf.rods())
-            .flat_map(|j| (0..n).map(move |i| (j, i)))
-            .map(|(j, i)| leaf.section(j, grid.segment_midpoint(i), grid.segment_width(i)))
-            .collect();
+        let mut sections = leaf.sections_on(&grid);
         leaf.fit_rest_shapes(&grid, &mut sections);
-        DiscreteLeaf::with_sections(leaf, grid, sections)
+        DiscreteLeaf::with_sections(leaf, grid, sections, None)
     }
 
-    /// Discretizes `leaf` on this grid with the sections of this leaf, if both have the same rods:
-    /// evaluating profiles takes as long as assembling a small leaf.
+    /// Discretizes `leaf` on this grid with the sections of this leaf, if both have the same rods, and with
+    /// its tissue, if that is the same, too: evaluating profiles takes as long as assembling a small leaf.
     pub fn with_same_rods(&self, leaf: &Leaf) -> Option<Self> {
-        let same = self.leaf.has_same_rods(leaf);
-        let copied = || (self.grid.clone(), self.sections.clone());
-        same.then(copied)
-            .map(|(grid, sections)| DiscreteLeaf::with_sections(leaf, grid, sections))
+        if !self.leaf.has_same_rods(leaf) {
+            return None;
+        }
+        let (grid, sections) = (self.grid.clone(), self.sections.clone());
+        let strips = self.leaf.has_same_tissue(leaf).then_some(&self.strips[..]);
+        Some(DiscreteLeaf::with_sections(leaf, grid, sections, strips))
     }
 
-    fn with_sections(leaf: &Leaf, grid: Grid, sections: Vec<Section>) -> Self {
+    /// Discretizes `leaf` on this grid with the rest shapes of this leaf, if both have the same: integrating
+    /// those of curved veins takes longer than all else.
+    pub fn with_same_rest_shapes(&self, leaf: &Leaf) -> Self {
+        let mut sections = leaf.sections_on(&self.grid);
+        match self.leaf.has_same_rest_shapes(leaf) {
+            true => {
+                let own = self.sections.iter().zip(&self.rest_curvatures);
+                for (section, (known, rest_curvature)) in sections.iter_mut().zip(own) {
+                    section.rest_strain = known.rest_strain;
+                    section.rest_curvature = *rest_curvature;
+                }
+            }
+            false => leaf.fit_rest_shapes(&self.grid, &mut sections),
+        }
+        DiscreteLeaf::with_sections(leaf, self.grid.clone(), sections, None)
+    }
+
+    /// The leaf with these sections, and these strips of tissue, if they are known.
+    fn with_sections(
+        leaf: &Leaf,
+        grid: Grid,
+        sections: Vec<Section>,
+        strips: Option<&[TissueStrip]>,
+    ) -> Self {
         let gaps = leaf.rods() - usize::from(!leaf.borders_own_image(leaf.rods() - 1));
         let coupling = (0..gaps).map(|g| leaf.coupling(g)).collect();
         let mut discrete = DiscreteLeaf {
@@ -161,9 +182,15 @@ impl DiscreteLeaf {
         discrete.point_moments = discrete.nodal_point_moments();
         discrete.scheduled_loads = discrete.find_scheduled_loads();
         discrete.followers = discrete.nodal_followers();
-        if leaf.scenario().needs_stress_free_leaf() || leaf.has_base_springs() {
+        if let Some(strips) = strips {
+            discrete.strips = strips.to_vec();
+        }
+        let makes_strips = leaf.has_tissue() && strips.is_none();
+        let scenario = leaf.scenario();
+        let is_held = !scenario.grips.is_empty() || scenario.foundation.is_some();
+        if makes_strips || is_held || leaf.has_base_springs() {
             // Holders and tissue have their places in the natural leaf, whatever the rest shapes are now.
-            let original = (leaf.scenario().natural.as_deref())
+            let original = (scenario.natural.as_deref())
                 .map(|natural| DiscreteLeaf::new(&Leaf::new(natural), discrete.grid.clone()));
             let unstrained = |grown: bool| {
                 original
@@ -171,12 +198,12 @@ impl DiscreteLeaf {
                     .unwrap_or(&discrete)
                     .unstrained_state(grown)
             };
-            let (natural, grown) = (unstrained(true), leaf.scenario().tissue_grown);
-            let ungrown = (leaf.has_tissue() && !grown).then(|| unstrained(false));
+            let natural = unstrained(true);
+            let ungrown = (makes_strips && !scenario.tissue_grown).then(|| unstrained(false));
             discrete.set_gripped_nodes(&natural);
             discrete.limit_held_segments();
             discrete.springs = discrete.springs_from(&natural);
-            if leaf.has_tissue() {
+            if makes_strips {
                 discrete.strips = discrete.tissue_strips(ungrown.as_ref().unwrap_or(&natural));
             }
         }
@@ -673,6 +700,14 @@ impl Grid {
 }
 
 impl Leaf {
+    /// The sections of all segments, rod after rod, with the rest shapes of their middles.
+    fn sections_on(&self, grid: &Grid) -> Vec<Section> {
+        let segments = (0..self.rods()).flat_map(|j| (0..grid.segments()).map(move |i| (j, i)));
+        segments
+            .map(|(j, i)| self.section(j, grid.segment_midpoint(i), grid.segment_width(i)))
+            .collect()
+    }
+
     /// Gives the segments of all rods, rod after rod, the rest shape between their nodes, if tissue
     /// ties the rods.
     fn fit_rest_shapes(&self, grid: &Grid, sections: &mut [Section]) {

@@ -366,6 +366,28 @@ impl Leaf {
             && self.scenario.rods == other.scenario.rods
     }
 
+    /// Whether the rods of another leaf have the same lengths, bases and rest shapes, in the same units.
+    fn has_same_rest_shapes(&self, other: &Leaf) -> bool {
+        let [own, others] = [self, other].map(|leaf| &leaf.scenario().rods);
+        (self.mirrored, self.scale) == (other.mirrored, other.scale)
+            && self.has_tissue() == other.has_tissue()
+            && own.len() == others.len()
+            && own
+                .iter()
+                .zip(others)
+                .all(|(a, b)| a.has_same_rest_shape(b))
+    }
+
+    /// Whether the tissue of another leaf with the same rods is the same, between nodes that are held alike.
+    fn has_same_tissue(&self, other: &Leaf) -> bool {
+        let [own, others] = [self, other].map(Leaf::scenario);
+        own.tissue == others.tissue
+            && (own.tissue_grown, own.joined) == (others.tissue_grown, others.joined)
+            && own.base_held == others.base_held
+            && own.grips == others.grips
+            && self.tip_support.is_some() == other.tip_support.is_some()
+    }
+
     /// Whether this is half of a leaf that is its own mirror image.
     pub fn is_mirror_half(&self) -> bool {
         self.mirrored
@@ -442,7 +464,8 @@ impl Leaf {
     /// Section of rod `j` at a place, for a segment that is the fraction `width` of the rod.
     pub fn section(&self, j: usize, place: impl Into<RodPlace>, width: f64) -> Section {
         let (rod, place) = (self.rod(j), place.into());
-        let at = |p: &[Profile; 3]| DVec3::from_array(Profile::values_of_three(p, place));
+        let at =
+            |p: &[Profile; 3]| DVec3::from_array(Profile::values_of_three(p.each_ref(), place));
         let share = self.share(j);
         Section {
             ds: self.length(j) * width,
@@ -528,12 +551,20 @@ impl Leaf {
             return TissueStiffness::default();
         };
         let gap_length = 0.5 * (self.length(g) + self.length(g + 1));
-        let [along, across, normal, fold] = tissue[g].stiffness_profiles().map(|of| of.at(sigma));
+        let Tissue {
+            stiffness: [along, across, normal],
+            fold,
+            contraction,
+        } = &tissue[g];
+        let [along, normal] = [along, normal].map(|of| of.at(sigma));
+        // What follows from a blade for these three is computed once.
+        let [across, fold, contraction] =
+            Profile::values_of_three([across, fold, contraction], sigma);
         let k = DVec3::new(along, across, normal) * self.scale.length.powi(2);
         TissueStiffness {
             displacement: k * gap_length / self.scale.force(),
             fold: fold * gap_length / self.scale.force(),
-            contraction: tissue[g].contraction.at(sigma) / self.scale.length,
+            contraction: contraction / self.scale.length,
         }
     }
 

@@ -225,7 +225,7 @@ impl Elements {
         forces.push((ends.len() - 1, rod.tip_force));
         Elements {
             stiffness: (0..at.len())
-                .map(|k| Profile::values_of_three(&rod.stiffness, place(k)))
+                .map(|k| Profile::values_of_three(rod.stiffness.each_ref(), place(k)))
                 .collect(),
             load: (0..at.len()).map(|k| rod.load(place(k))).collect(),
             edges,
@@ -300,7 +300,7 @@ impl Elements {
     pub fn stiffness_everywhere(&self, rod: &HangingRod, k: usize) -> [f64; 3] {
         let (e, own) = (k / (POINTS + 1), k % (POINTS + 1));
         match own {
-            0 => Profile::values_of_three(&rod.stiffness, self.ends[e]),
+            0 => Profile::values_of_three(rod.stiffness.each_ref(), self.ends[e]),
             own => self.stiffness[e * POINTS + own - 1],
         }
     }

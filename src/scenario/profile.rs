@@ -107,8 +107,9 @@ pub(super) trait RodProperties: Debug + Send + Sync + UnwindSafe + RefUnwindSafe
     /// The description as a value of its own type.
     fn as_any(&self) -> &dyn Any;
 
-    /// Whether another description has the same type and content.
-    fn is_equal(&self, other: &dyn Any) -> bool;
+    /// Whether another description has the same type, and this property is the same everywhere, with the
+    /// same kinks and seams.
+    fn has_equal_property(&self, property: usize, other: &dyn Any) -> bool;
 }
 
 /// A property of a section or a blade along a rod, times a factor.
@@ -136,7 +137,8 @@ impl DerivedProfile {
 impl PartialEq for DerivedProfile {
     fn eq(&self, other: &Self) -> bool {
         let same = (self.property, self.factor) == (other.property, other.factor);
-        same && self.source.is_equal(other.source.as_any())
+        same && (Arc::ptr_eq(&self.source, &other.source)
+            || (self.source).has_equal_property(self.property, other.source.as_any()))
     }
 }
 
@@ -171,7 +173,7 @@ impl Profile {
     }
 
     /// The values of three profiles at a place: what they have in common is computed once.
-    pub fn values_of_three(profiles: &[Profile; 3], place: impl Into<RodPlace>) -> [f64; 3] {
+    pub fn values_of_three(profiles: [&Profile; 3], place: impl Into<RodPlace>) -> [f64; 3] {
         let place = place.into();
         if let [
             Profile::Derived(first),
@@ -190,7 +192,7 @@ impl Profile {
                 }
             }
         }
-        profiles.each_ref().map(|profile| profile.at(place))
+        profiles.map(|profile| profile.at(place))
     }
 
     /// The integral over fractions from 0 to `sigma` in [0, 1].

@@ -53,6 +53,14 @@ impl Rod {
         triples.into_iter().flatten().chain([&self.rest_stretch])
     }
 
+    /// Whether another rod has the same length, base and rest shape.
+    pub(crate) fn has_same_rest_shape(&self, other: &Rod) -> bool {
+        let place = |rod: &Rod| (rod.length, rod.base, [rod.angle, rod.elevation, rod.roll]);
+        place(self) == place(other)
+            && self.rest_curvature == other.rest_curvature
+            && self.rest_stretch == other.rest_stretch
+    }
+
     /// The rotation of the directors at the base: by the fan's angle about e3, after the elevation
     /// about -e2, so that d1 = (cos e cos phi, cos e sin phi, sin e), after the roll about e1.
     pub fn base_rotation(&self) -> DQuat {

@@ -229,7 +229,7 @@ impl<'a> TissueEnergy<'a> {
                     true => rod.rest_stretch.at(place),
                     false => 1.0,
                 };
-                let bend = Profile::values_of_three(&rod.rest_curvature, place);
+                let bend = Profile::values_of_three(rod.rest_curvature.each_ref(), place);
                 FrameRates {
                     position: DVec3::X * (stretch * rod.length / self.length),
                     rotation: DVec3::from_array(bend) * rod.length,

@@ -19,6 +19,7 @@ mod modes;
 mod off_axis;
 mod point_masses;
 mod rollers;
+mod shared_parts;
 mod small_motions;
 mod taut_rods;
 mod trace_consistent;

@@ -512,7 +512,7 @@ fn mark_unconfirmed_reference(
     let radius = (0.14 * cell.size.min_element()).clamp(1.0, 2.2);
     let at = cell.corner.with_x(cell.opposite_corner().x) + 2.0 * radius * DVec2::new(-1.0, 1.0);
     let (color, rim) = match reference {
-        ReferenceConfidence::Confirmed => return,
+        ReferenceConfidence::Confirmed | ReferenceConfidence::FinerGrids => return,
         ReferenceConfidence::Unconfirmed => (TEXT_COLOR, Stroke::new(WHITE, 0.5)),
         ReferenceConfidence::None => (WHITE, Stroke::new(TEXT_COLOR, 0.8)),
     };

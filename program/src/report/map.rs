@@ -5,7 +5,7 @@ use crate::report::numbers::{duration_text, format_five_digits, number_in_key_un
 use crate::report::sweep::varied_lines;
 use crate::report::table::{LabelledLines, append_csv_rows, label_first_line, text_cell};
 use leafdyn::scenario::Units;
-use leafdyn::study::{Map, MapOutcome, MapRemark};
+use leafdyn::study::{Map, MapOutcome, MapRemark, ReferenceConfidence};
 use std::fmt::Write as _;
 use std::io;
 use std::io::Write;
@@ -34,7 +34,15 @@ impl ReportedResult for ReportedMap<'_> {
         let mut lines = varied_lines(&request.axes, units);
         let (known, confirmed) = self.map.known_and_confirmed_cells();
         let cells = request.cells();
-        let cells = format!("{known} of {cells}, reference confirmed in {confirmed}");
+        let cells = match self.map.reference_count(ReferenceConfidence::FinerGrids) {
+            0 => format!("{known} of {cells}, reference confirmed in {confirmed}"),
+            finer if finer == known => {
+                format!("{known} of {cells}, compared with the leaf relaxed on finer grids")
+            }
+            finer => format!(
+                "{known} of {cells}, reference confirmed in {confirmed}, from finer grids in {finer}"
+            ),
+        };
         lines.push(("cells", cells));
         let (count, time) = (self.map.rows.len(), duration_text(self.seconds));
         let rows = format!("{count} computed in {time}");

@@ -69,6 +69,27 @@ fn explicit_motion_is_right_only_below_its_bound_and_where_little_is_stretched()
     }
 }
 
+/// The tissue of a blade is rigid along and normal to its veins: the leaf relaxed on finer grids is the reference, and
+/// tells the error of a coarse grid.
+#[test]
+fn a_blade_is_compared_with_itself_on_finer_grids() {
+    let base = BaseScenario::read(&path("measured/blade"), &entries("leaf.rods=5")).unwrap();
+    let axes = vec!["method.segments=16..32:2".parse().unwrap()];
+    let methods = [SEMI_IMPLICIT];
+    let request = MapRequest::new(base, axes, Some(methods.to_vec()), None, LONG).unwrap();
+    let errors = [0, 1].map(|number| {
+        let rows = request.solve_cell(number, &methods);
+        expect(&rows, &[Right]);
+        assert_eq!(rows[0].reference, ReferenceConfidence::FinerGrids);
+        let (error, bar) = (rows[0].error.unwrap(), rows[0].error_estimate.unwrap());
+        assert!(error <= bar, "{error:e} beyond {bar:e}");
+        error
+    });
+    // Grids are of second order; one of twice as many segments need not halve each.
+    let ratio = errors[0] / errors[1];
+    assert!(ratio > 2.5 && ratio < 7.0, "{ratio}");
+}
+
 fn soft(bending: &str, load: &str, methods: &[MapMethod], seconds: f64) -> Vec<MapRow> {
     let values = [("stiffness.bending_2", bending), ("load.gravity[2]", load)];
     cell("fig04", "leaf.rods=3", &values, methods, seconds)

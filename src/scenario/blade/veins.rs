@@ -481,14 +481,18 @@ impl RodProperties for BladePart {
         }
     }
 
-    /// Three stiffnesses, or three rest curvatures, of a vein.
+    /// Three stiffnesses, or three rest curvatures, of a vein; all that tissue has.
     fn three_values_at(
         &self,
         properties: [usize; 3],
         RodPlace { sigma, .. }: RodPlace,
     ) -> Option<[f64; 3]> {
-        let BladePartSource::Vein(vein) = &self.source else {
-            return None;
+        let vein = match &self.source {
+            BladePartSource::Vein(vein) => vein,
+            BladePartSource::Gap { .. } => {
+                let all = self.properties(sigma);
+                return Some(properties.map(|index| all[index]));
+            }
         };
         let all_in = |range: Range<usize>| properties.iter().all(|index| range.contains(index));
         if all_in(STIFFNESSES) {
@@ -526,7 +530,18 @@ impl RodProperties for BladePart {
         self
     }
 
-    fn is_equal(&self, other: &dyn Any) -> bool {
-        other.downcast_ref() == Some(self)
+    /// Rest curvatures follow from the outline alone.
+    fn has_equal_property(&self, property: usize, other: &dyn Any) -> bool {
+        let Some(other) = other.downcast_ref::<BladePart>() else {
+            return false;
+        };
+        match (&self.source, &other.source) {
+            (BladePartSource::Vein(one), BladePartSource::Vein(two))
+                if REST_CURVATURES.contains(&property) =>
+            {
+                self.kinks == other.kinks && one.eta == two.eta && one.outline == two.outline
+            }
+            _ => self == other,
+        }
     }
 }

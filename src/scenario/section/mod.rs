@@ -475,7 +475,7 @@ impl RodProperties for Section {
         self
     }
 
-    fn is_equal(&self, other: &dyn Any) -> bool {
+    fn has_equal_property(&self, _: usize, other: &dyn Any) -> bool {
         other.downcast_ref() == Some(self)
     }
 }

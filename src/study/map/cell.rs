@@ -17,7 +17,7 @@ use crate::relax::{
     rod_shapes,
 };
 use crate::run::{Instant, Limit};
-use crate::scenario::{Scenario, longest};
+use crate::scenario::{Scenario, Tissue, longest};
 use crate::shape::Undulation;
 use crate::shooting::{ShootingFailureReason, ShootingStart};
 use crate::simulate::request::DEFAULT_MOTION_SEGMENTS;
@@ -44,6 +44,10 @@ const REFERENCE_TOLERANCE_RATIO: f64 = 1e-2;
 
 const LEAST_REFERENCE_TOLERANCE: f64 = 1e-12;
 
+/// The same factor where the reference is a relaxation on finer grids: of the leaf of nine veins in
+/// scenarios/measured/blade.toml one to a tenth takes as long as the answer, and shooting thirty times as long.
+const FINER_GRIDS_TOLERANCE_RATIO: f64 = 1e-1;
+
 /// Lower bound on the seconds per node on any machine; two to four times as many are measured.
 /// A grid is built and its solution started before the time limit is first checked.
 const LEAST_SECONDS_PER_NODE: f64 = 3e-6;
@@ -66,8 +70,8 @@ pub struct MapCell<'a> {
 }
 
 impl<'a> MapCell<'a> {
-    /// Finds the reference: the relaxed leaf, and the solution of the
-    /// boundary-value problem near it.
+    /// Finds the reference: the relaxed leaf, and the solution of the boundary-value problem near it, or, where
+    /// the forces of tissue are unknowns as well, the leaf relaxed on finer grids.
     pub fn new(
         varied: &'a VariedScenario,
         tolerance: Option<f64>,
@@ -97,13 +101,24 @@ impl<'a> MapCell<'a> {
             reference: None,
             confidence: ReferenceConfidence::None,
         };
-        let sharp = (REFERENCE_TOLERANCE_RATIO * tolerance).max(LEAST_REFERENCE_TOLERANCE);
-        let shot = run_within_limit(limit, all, |limit| {
-            cell.shoot_from_relaxed_leaf(sharp, limit)
-        })
-        .result;
+        let mut tissue = scenario.tissue.iter().flatten();
+        let on_finer_grids = tissue.any(Tissue::has_unknown_forces);
+        let (ratio, confidence) = match on_finer_grids {
+            true => (FINER_GRIDS_TOLERANCE_RATIO, ReferenceConfidence::FinerGrids),
+            false => (REFERENCE_TOLERANCE_RATIO, ReferenceConfidence::Confirmed),
+        };
+        let sharp = (ratio * tolerance).max(LEAST_REFERENCE_TOLERANCE);
         if let Ok(relaxed) = &cell.relaxed_answer.result {
-            let chosen = choose_reference(relaxed, shot.ok());
+            let second = run_within_limit(limit, all, |limit| match on_finer_grids {
+                true => relax_with_error_estimate(
+                    scenario,
+                    SemiImplicit::default().into(),
+                    sharp,
+                    limit,
+                ),
+                false => cell.shoot_from_relaxed_leaf(sharp, limit),
+            });
+            let chosen = choose_reference(relaxed, second.result.ok(), confidence);
             (cell.confidence, cell.reference) = (chosen.confidence, Some(chosen.solution));
         }
         cell
@@ -392,25 +407,28 @@ struct CellReference {
     solution: MethodSolution,
 }
 
-/// The reference, from a relaxed leaf and, if found, the shooting solution started from it.
-/// If they agree, also in their numbers of negative eigenvalues, it is the shooting solution;
-/// if not, only if that is stable.
-fn choose_reference(relaxed: &MethodSolution, shot: Option<MethodSolution>) -> CellReference {
+/// The reference, from a relaxed leaf and, if found, a second, sharper solution. If they agree, also in their
+/// numbers of negative eigenvalues, it is the second one, with this confidence; if not, only if that is stable.
+fn choose_reference(
+    relaxed: &MethodSolution,
+    second: Option<MethodSolution>,
+    confidence: ReferenceConfidence,
+) -> CellReference {
     let unconfirmed = |solution: MethodSolution| CellReference {
         confidence: ReferenceConfidence::Unconfirmed,
         solution,
     };
-    let Some(shot) = shot else {
+    let Some(second) = second else {
         return unconfirmed(relaxed.clone());
     };
-    let distance = relaxed.largest_distance(&shot);
-    let same = distance.is_some_and(|distance| relaxed.agrees_within_errors(&shot, distance));
-    match (same && shot.index == relaxed.index, shot.index) {
+    let distance = relaxed.largest_distance(&second);
+    let same = distance.is_some_and(|distance| relaxed.agrees_within_errors(&second, distance));
+    match (same && second.index == relaxed.index, second.index) {
         (true, _) => CellReference {
-            confidence: ReferenceConfidence::Confirmed,
-            solution: shot,
+            confidence,
+            solution: second,
         },
-        (false, Some(0)) => unconfirmed(shot),
+        (false, Some(0)) => unconfirmed(second),
         (false, _) => unconfirmed(relaxed.clone()),
     }
 }

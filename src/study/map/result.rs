@@ -43,14 +43,26 @@ impl Map {
 
     /// Number of cells with rows, and of those whose reference is confirmed.
     pub fn known_and_confirmed_cells(&self) -> (usize, usize) {
+        let references = self.cell_references();
+        (
+            references.len(),
+            self.reference_count(ReferenceConfidence::Confirmed),
+        )
+    }
+
+    /// Number of cells with a reference of this reliability.
+    pub fn reference_count(&self, confidence: ReferenceConfidence) -> usize {
+        let references = self.cell_references();
+        references.iter().filter(|of| **of == confidence).count()
+    }
+
+    /// The reliability of the reference in every cell with rows.
+    fn cell_references(&self) -> Vec<ReferenceConfidence> {
         let mut cells: Vec<(usize, ReferenceConfidence)> = (self.rows.iter())
             .map(|row| (row.cell, row.reference))
             .collect();
         cells.dedup_by_key(|(cell, _)| *cell);
-        let confirmed = |(_, reference): &&(usize, ReferenceConfidence)| {
-            *reference == ReferenceConfidence::Confirmed
-        };
-        (cells.len(), cells.iter().filter(confirmed).count())
+        cells.into_iter().map(|(_, reference)| reference).collect()
     }
 }
 
@@ -143,7 +155,10 @@ words! {
         /// Relaxation and shooting from there agree within both error estimates,
         /// and so do their numbers of negative eigenvalues.
         Confirmed = "confirmed",
-        /// They do not: the reference is the shooting solution if that is a stable
+        /// Where tissue is rigid or contracts: relaxations to the tolerance and to a tenth of it, on
+        /// finer grids, agree so, and no other method is asked.
+        FinerGrids = "finer-grids",
+        /// They do not: the reference is the second solution if that is a stable
         /// equilibrium, otherwise the relaxed leaf.
         Unconfirmed = "unconfirmed",
         /// The relaxation did not come to rest.

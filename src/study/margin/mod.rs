@@ -57,6 +57,8 @@ struct PushBranch {
     most_points: usize,
     /// Points after the loss of stability that are needed to confirm it.
     confirming_points: usize,
+    /// Of so many points in a row under which the leaf stays stable one is verified on finer grids.
+    points_per_verification: usize,
     /// Grids of a critical point: for a leaf of few nodes, and for others.
     critical_grids: [usize; 2],
     /// Largest number of nodes of a leaf of few nodes.
@@ -68,6 +70,7 @@ const PUSH_BRANCH: PushBranch = PushBranch {
     longest_step: 0.1,
     most_points: 400,
     confirming_points: 2,
+    points_per_verification: 4,
     critical_grids: [4, 3],
     few_nodes: 500,
 };
@@ -482,6 +485,7 @@ fn continue_to_stability_loss(
         max_points: PUSH_BRANCH.most_points,
         critical_grids: PUSH_BRANCH.critical_grids[usize::from(nodes > PUSH_BRANCH.few_nodes)],
         stop_criterion: Some(&enough),
+        points_per_verification: PUSH_BRANCH.points_per_verification,
     };
     let mut report = |_, fraction: f64| {
         let push = (direction, fraction * stable.largest_force);

@@ -12,7 +12,7 @@ use crate::branch::{
     ExtrapolatedPoint, LeafFamily, NestedBranchEquations, ParameterRange, VerifiedBranch,
     begin_branch, switch_branches,
 };
-use crate::leaf::{BucklingMode, Grid, NodalField, displacement_part};
+use crate::leaf::{BucklingMode, Grid, Leaf, NodalField, displacement_part};
 use crate::memory;
 use crate::relax::{
     Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax,
@@ -251,7 +251,11 @@ fn trace_with_points_from(
     };
     let rest = match given {
         Some((leaf, _)) => leaf.clone(),
-        None => first_equilibrium(&scenario, &options, request.keep_unstable)?,
+        None => on_side_of_range(
+            &scenario,
+            first_equilibrium(&scenario, &options, request.keep_unstable)?,
+            bias_direction,
+        ),
     };
     let fraction = ParameterRange {
         ends,
@@ -352,6 +356,21 @@ fn first_equilibrium(
         ..options.clone()
     };
     relax(scenario, &stable, &mut |_| {})
+}
+
+/// The leaf at rest or, if nothing leads it out of the plane z = 0, its mirror image in that plane, which is at rest
+/// as well: the one to whose side the range pushes. From the other side the leaf would snap to it. Where a flat leaf
+/// twists before it rises, the push with which it leaves the plane does not decide on the side.
+fn on_side_of_range(scenario: &Scenario, mut rest: Equilibrium, push: DVec3) -> Equilibrium {
+    let height: f64 = rest.tips.iter().map(|tip| tip.z).sum();
+    if push.z * height >= 0.0 || !Leaf::new(scenario).is_planar() {
+        return rest;
+    }
+    for node in rest.shape.rods.iter_mut().flat_map(|rod| &mut rod.nodes) {
+        *node = node.mirrored_in_base_plane();
+    }
+    rest.tips.iter_mut().for_each(|tip| tip.z = -tip.z);
+    rest
 }
 
 /// Segments of the requested grid, or as many as the leaf needs, if memory allows.
@@ -584,11 +603,11 @@ impl BranchTracer<'_, '_> {
 
     /// Waves and twist of the leaf at a point, on its finest grid.
     fn undulation_at(&self, refined: &ExtrapolatedPoint) -> Option<Undulation> {
-        let scenario = self.family.scenario([refined.fraction]).ok()?;
+        let leaf = self.family.leaf([refined.fraction]).ok()?;
         let rods = refined.shapes(self.family).ok()?;
         let error = Some(refined.position_error * self.family.scale().length);
         Some(Undulation::at_stations(
-            &scenario,
+            leaf.scenario(),
             refined.grid.sigma(),
             &rods,
             error,
