@@ -564,4 +564,4 @@ impl<'a> LinearizedMotion<'a> {
 }
 
 #[cfg(test)]
-pub(crate) mod tests;
+mod tests;

@@ -504,6 +504,3 @@ impl Serialize for Assumptions {
         serializer.collect_seq(self.0.words())
     }
 }
-
-#[cfg(test)]
-mod tests;

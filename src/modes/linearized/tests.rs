@@ -7,7 +7,7 @@ use nalgebra::DMatrix;
 
 /// All roots from the companion matrix of M^-1 (K - W) and M^-1 C, in which every unknown that is not held has mass: it shares
 /// neither the inverse nor the eigenvalue solver with [`all_roots`].
-pub fn reference_roots(
+fn reference_roots(
     leaf: &DiscreteLeaf,
     physics: &Physics,
     state: &State,
