@@ -15,37 +15,22 @@
 //!
 //! The inverse is that of the factorized K, corrected for W by the minimal residual method, as in Newton's
 //! method. Several starts at once find roots of several modes; the search ends when the residuals of all
-//! roots that are wanted are small.
+//! roots that are wanted are small. A motion that grows may be farther from zero than any number of others: of a
+//! leaf of few unknowns all roots are those of a dense matrix.
 
 use crate::krylov::{KrylovLimits, solve_minimal_residual};
 use crate::leaf::{DirectSolver, DiscreteLeaf, MatrixFactors, NodalField, State, System};
 use crate::modes::MassMatrix;
+use crate::modes::arnoldi::{RitzPairs, RitzValue, largest_eigenvalues};
+use crate::modes::node_blocks::NodeBlocks;
 use crate::motion::Physics;
 use crate::newton::FollowerForces;
 use crate::run::Limit;
 use faer::{Mat, c64};
+use glam::{DMat3, DQuat};
 
-/// The search for roots.
-struct RootSearch {
-    /// Number of starts: so many equal roots are found.
-    starts: usize,
-    /// Largest number of directions.
-    most_directions: usize,
-    /// Directions between looks at the roots.
-    check_every: usize,
-    /// Residual of an eigenvalue, as a part of it.
-    accuracy: f64,
-    /// Size of a new direction, as a part of the image, below which there is none.
-    exhausted: f64,
-}
-
-const SEARCH: RootSearch = RootSearch {
-    starts: 3,
-    most_directions: 300,
-    check_every: 12,
-    accuracy: 1e-10,
-    exhausted: 1e-13,
-};
+/// Number of starts of the search for roots: so many equal ones are found.
+const STARTS: usize = 3;
 
 /// Limits of the inverse with forces without a potential.
 const INVERSE_LIMITS: KrylovLimits = KrylovLimits {
@@ -57,6 +42,17 @@ const INVERSE_LIMITS: KrylovLimits = KrylovLimits {
 
 /// Largest residual of the inverse, which rounding may leave above its accuracy.
 const LARGEST_INVERSE_RESIDUAL: f64 = 1e-8;
+
+/// Largest number of states of which all roots are computed: about a second.
+pub const MOST_DENSE_STATES: usize = 600;
+
+/// Size of an eigenvalue of a dense matrix, as a part of the largest, from which on rounding may add an imaginary
+/// part that looks like growth.
+const DENSE_ROUNDING: f64 = 1e-6;
+
+/// Stiffness of springs on all unknowns, in A/L^2, that hold a leaf that can turn without resistance, of which all
+/// roots are computed: with the least ones the others would be lost beside the one that is nearly zero.
+const DENSE_NEUTRAL_SHIFT: f64 = 1e-3;
 
 /// A root of the linearised motion, or a pair of conjugate ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -112,17 +108,32 @@ impl MotionRoot {
 }
 
 /// The linearised motion of a leaf about a state of rest.
-struct LinearizedMotion<'a> {
+pub(super) struct LinearizedMotion<'a> {
     leaf: &'a DiscreteLeaf,
     state: &'a State,
     forces: &'a dyn FollowerForces,
     physics: &'a Physics,
-    solver: DirectSolver,
+    pub(super) solver: DirectSolver,
     system: System,
     /// The equations with rods twice as stiff under the same stresses, if the material is damped: the
     /// difference is their material stiffness.
     stiffened: Option<System>,
     masses: MassMatrix,
+    /// What has no potential as blocks, where the equations are the transposed ones.
+    transposed: Option<TransposedForces>,
+}
+
+/// A vector times the matrix polynomial of a motion, and times its derivative by lambda.
+pub(super) struct PolynomialProduct {
+    pub value: Vec<c64>,
+    pub slope: Vec<c64>,
+}
+
+/// The derivatives of the forces without a potential, whose transposes act.
+struct TransposedForces {
+    by_displacement: NodeBlocks,
+    /// In wind.
+    by_velocity: Option<NodeBlocks>,
 }
 
 /// The roots of the linearised motion next to zero, at least `count` of them if there are so many. `None` if memory is short, the time limit is exceeded, or they do
@@ -135,52 +146,88 @@ pub fn lowest_roots(
     count: usize,
     time: &Limit,
 ) -> Option<MotionRoots> {
-    let mut system = System::new(leaf);
-    leaf.assemble(state, &mut system);
-    let solver = DirectSolver::for_coupling_pattern(&system).ok()?;
-    let neutral = match leaf.zero_energy_fields(state).is_empty() {
-        true => 0.0,
-        false => leaf.neutral_shift(),
+    let shift = leaf.neutral_shift();
+    let (motion, mut factors) = LinearizedMotion::new(leaf, physics, state, forces, shift)?;
+    Some(match motion.is_damped_beside_masses() {
+        false => motion.roots_of_squares(motion.squares(&mut factors, count, time)?),
+        true => sorted_damped(motion.roots_of_states(&mut factors, count, time)?),
+    })
+}
+
+/// All roots of the linearised motion, from a dense matrix: none that grows is missed, but for those whose size
+/// is so large that the matrix is rounded there. `None` if the states of what moves are more than
+/// [`MOST_DENSE_STATES`], or the matrix is singular.
+pub fn all_roots(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    forces: &dyn FollowerForces,
+) -> Option<MotionRoots> {
+    let shift = DENSE_NEUTRAL_SHIFT.max(leaf.neutral_shift());
+    let (motion, mut factors) = LinearizedMotion::new(leaf, physics, state, forces, shift)?;
+    let damped = motion.is_damped_beside_masses();
+    let moving = motion.moving_unknowns();
+    let states = match damped {
+        false => moving.len(),
+        true => 2 * moving.len(),
     };
-    let mut factors = solver.factorize(&system, neutral).ok()?;
-    let stiffened = (physics.retardation > 0.0).then(|| {
-        let mut stiffened = System::new(leaf);
-        leaf.with_doubled_stiffness(state)
-            .assemble(state, &mut stiffened);
-        stiffened
-    });
-    let motion = LinearizedMotion {
-        leaf,
-        state,
-        forces,
-        physics,
-        masses: MassMatrix::new(leaf, physics, state, &solver),
-        solver,
-        system,
-        stiffened,
-    };
-    let mut roots = match motion.is_damped_beside_masses() {
+    if states > MOST_DENSE_STATES {
+        return None;
+    }
+    let masses = |unit: &[f64]| motion.masses.times(unit);
+    let of_masses = motion.dense_inverse(&mut factors, &moving, &masses)?;
+    Some(match damped {
         false => {
-            let squares = motion.squares(&mut factors, count, time)?;
-            if physics.damping == 0.0 {
-                return Some(MotionRoots::Squares(squares));
-            }
-            // One of each conjugate pair.
-            let squares = squares.iter().map(|it| it.value).filter(|it| it.im >= 0.0);
-            let half = 0.5 * physics.damping;
-            let root = |square: c64| {
-                let root = MotionRoot::from_square(square + half * half);
-                MotionRoot {
-                    growth: root.growth - half,
-                    ..root
-                }
+            let squares = nonzero_eigenvalues(&of_masses)?.into_iter();
+            let square = |nu: c64| Square {
+                value: -nu.finv(),
+                alignment: 0.0,
             };
-            squares.map(root).collect()
+            motion.roots_of_squares(squares.map(square).collect())
         }
-        true => motion.roots_of_states(&mut factors, count, time)?,
-    };
+        true => {
+            let damping = |unit: &[f64]| motion.damping(unit);
+            let of_damping = motion.dense_inverse(&mut factors, &moving, &damping)?;
+            let count = moving.len();
+            let companion =
+                Mat::from_fn(2 * count, 2 * count, |r, c| match (r < count, c < count) {
+                    (true, true) => -of_damping[(r, c)],
+                    (true, false) => -of_masses[(r, c - count)],
+                    (false, _) => f64::from(r == c + count),
+                });
+            let upper = nonzero_eigenvalues(&companion)?.into_iter();
+            let upper = upper.filter(|mu| mu.im >= 0.0);
+            sorted_damped(upper.map(|mu| MotionRoot::new(mu.finv())).collect())
+        }
+    })
+}
+
+/// States of the motion of a node: those of unknowns that follow statically do not count.
+pub fn states_per_node(leaf: &DiscreteLeaf, physics: &Physics) -> usize {
+    let rotates = physics.retardation > 0.0
+        || leaf.rod_index_pairs(leaf.moving_nodes()).any(|(j, i)| {
+            let inertia = physics.inertia(leaf, j, i);
+            inertia.tensor(DQuat::IDENTITY) != DMat3::ZERO
+        });
+    let unknowns = if rotates { 6 } else { 3 };
+    match leaf.leaf.in_wind() || physics.retardation > 0.0 {
+        true => 2 * unknowns,
+        false => unknowns,
+    }
+}
+
+/// The eigenvalues of a dense matrix that are not zero by rounding, the largest first.
+fn nonzero_eigenvalues(matrix: &Mat<f64>) -> Option<Vec<c64>> {
+    let mut all = matrix.eigenvalues().ok()?;
+    all.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    let largest = all.first()?.norm();
+    all.retain(|value| value.norm() > DENSE_ROUNDING * largest);
+    largest.is_finite().then_some(all)
+}
+
+fn sorted_damped(mut roots: Vec<MotionRoot>) -> MotionRoots {
     roots.sort_by(|a, b| a.size().total_cmp(&b.size()));
-    Some(MotionRoots::Damped(roots))
+    MotionRoots::Damped(roots)
 }
 
 impl DiscreteLeaf {
@@ -203,9 +250,117 @@ impl DiscreteLeaf {
     }
 }
 
-impl LinearizedMotion<'_> {
+impl<'a> LinearizedMotion<'a> {
+    /// The linearised motion, and the factors of its stiffness, to which that of springs is added if it can turn
+    /// without resistance; `None` if memory is short.
+    pub(super) fn new(
+        leaf: &'a DiscreteLeaf,
+        physics: &'a Physics,
+        state: &'a State,
+        forces: &'a dyn FollowerForces,
+        neutral_shift: f64,
+    ) -> Option<(Self, MatrixFactors)> {
+        let mut system = System::new(leaf);
+        leaf.assemble(state, &mut system);
+        let solver = DirectSolver::for_coupling_pattern(&system).ok()?;
+        let neutral = match leaf.zero_energy_fields(state).is_empty() {
+            true => 0.0,
+            false => neutral_shift,
+        };
+        let factors = solver.factorize(&system, neutral).ok()?;
+        let stiffened = (physics.retardation > 0.0).then(|| {
+            let mut stiffened = System::new(leaf);
+            leaf.with_doubled_stiffness(state)
+                .assemble(state, &mut stiffened);
+            stiffened
+        });
+        let motion = LinearizedMotion {
+            leaf,
+            state,
+            forces,
+            physics,
+            masses: MassMatrix::new(leaf, physics, state, &solver),
+            solver,
+            system,
+            stiffened,
+            transposed: None,
+        };
+        Some((motion, factors))
+    }
+
+    /// The motion whose matrices are the transposes of these: it has the same roots.
+    pub(super) fn transpose(mut self) -> Self {
+        let by_displacement = self.probe(&|field, change| {
+            (self.forces).add_derivative(self.state, field, change);
+        });
+        let windy = self.leaf.leaf.in_wind();
+        let by_velocity = windy.then(|| {
+            self.probe(&|field, change| {
+                (self.forces).add_velocity_derivative(self.state, field, change);
+            })
+        });
+        self.transposed = Some(TransposedForces {
+            by_displacement,
+            by_velocity,
+        });
+        self
+    }
+
+    /// The blocks of a matrix that ties neighbouring nodes of a rod alone.
+    fn probe(&self, product: &dyn Fn(&NodalField, &mut NodalField)) -> NodeBlocks {
+        NodeBlocks::probe(&self.no_forces(), product)
+    }
+
+    /// The roots from their squares, or from lambda^2 + a lambda where masses are damped by a.
+    fn roots_of_squares(&self, squares: Vec<Square>) -> MotionRoots {
+        if self.physics.damping == 0.0 {
+            return MotionRoots::Squares(squares);
+        }
+        // One of each conjugate pair.
+        let squares = squares.iter().map(|it| it.value).filter(|it| it.im >= 0.0);
+        let root = |square: c64| MotionRoot::new(self.root_of_square(square));
+        sorted_damped(squares.map(root).collect())
+    }
+
+    /// The root lambda of lambda^2 + a lambda that grows faster, where masses are damped by a.
+    pub(super) fn root_of_square(&self, square: c64) -> c64 {
+        let half = 0.5 * self.physics.damping;
+        let root = MotionRoot::from_square(square + half * half);
+        c64::new(root.growth - half, root.frequency)
+    }
+
+    /// The unknowns with mass or damping; the others follow them statically.
+    fn moving_unknowns(&self) -> Vec<usize> {
+        let size = self.solver.size();
+        let damped = self.is_damped_beside_masses();
+        let moves = |at: &usize| {
+            let mut unit = vec![0.0; size];
+            unit[*at] = 1.0;
+            let acts = |image: &[f64]| image.iter().any(|value| *value != 0.0);
+            acts(&self.masses.times(&unit)) || damped && acts(&self.damping(&unit))
+        };
+        (0..size).filter(moves).collect()
+    }
+
+    /// (K - W)^-1 times a matrix that is known by its products, for these unknowns.
+    fn dense_inverse(
+        &self,
+        factors: &mut MatrixFactors,
+        unknowns: &[usize],
+        product: &dyn Fn(&[f64]) -> Vec<f64>,
+    ) -> Option<Mat<f64>> {
+        let mut columns = Vec::new();
+        for at in unknowns {
+            let mut unit = vec![0.0; self.solver.size()];
+            unit[*at] = 1.0;
+            columns.push(self.inverse(factors, &product(&unit))?);
+        }
+        let count = unknowns.len();
+        Some(Mat::from_fn(count, count, |r, c| columns[c][unknowns[r]]))
+    }
+
     /// Whether there is damping that is not proportional to the masses.
-    fn is_damped_beside_masses(&self) -> bool {
+    pub(super) fn is_damped_beside_masses(&self) -> bool {
         self.stiffened.is_some() || self.leaf.leaf.in_wind()
     }
 
@@ -236,7 +391,13 @@ impl LinearizedMotion<'_> {
     /// W times a vector.
     fn force_derivative(&self, vector: &[f64]) -> Vec<f64> {
         let mut change = self.no_forces();
-        (self.forces).add_derivative(self.state, &self.field(vector), &mut change);
+        let field = self.field(vector);
+        match &self.transposed {
+            Some(blocks) => blocks
+                .by_displacement
+                .add_transposed_product(&field, &mut change),
+            None => (self.forces).add_derivative(self.state, &field, &mut change),
+        }
         self.vector(&change)
     }
 
@@ -257,7 +418,14 @@ impl LinearizedMotion<'_> {
         }
         if self.leaf.leaf.in_wind() {
             let mut drag = self.no_forces();
-            (self.forces).add_velocity_derivative(self.state, &field, &mut drag);
+            match self
+                .transposed
+                .as_ref()
+                .and_then(|it| it.by_velocity.as_ref())
+            {
+                Some(blocks) => blocks.add_transposed_product(&field, &mut drag),
+                None => (self.forces).add_velocity_derivative(self.state, &field, &mut drag),
+            }
             more(-1.0, &drag);
         }
         sum
@@ -301,12 +469,7 @@ impl LinearizedMotion<'_> {
         count: usize,
         time: &Limit,
     ) -> Option<Vec<Square>> {
-        let mut starts = Vec::new();
-        for number in 0..SEARCH.starts {
-            starts.push(self.inverse(factors, &self.start(number))?);
-        }
-        let apply = &mut |q: &[f64]| self.inverse(factors, &self.masses.times(q));
-        let eigenvalues = largest_eigenvalues(starts, count, apply, time)?;
+        let eigenvalues = self.eigenpairs_of_squares(factors, count, time)?.values;
         let square = |it: &RitzValue, next: Option<&RitzValue>| Square {
             value: -it.eigenvalue.finv(),
             alignment: next.map_or(0.0, |next| it.alignment(next)),
@@ -319,6 +482,21 @@ impl LinearizedMotion<'_> {
         )
     }
 
+    /// The eigenpairs of (K - W)^-1 M of largest eigenvalues, conjugate ones both.
+    pub(super) fn eigenpairs_of_squares(
+        &self,
+        factors: &mut MatrixFactors,
+        count: usize,
+        time: &Limit,
+    ) -> Option<RitzPairs> {
+        let mut starts = Vec::new();
+        for number in 0..STARTS {
+            starts.push(self.inverse(factors, &self.start(number))?);
+        }
+        let apply = &mut |q: &[f64]| self.inverse(factors, &self.masses.times(q));
+        largest_eigenvalues(starts, count, apply, time)
+    }
+
     /// The roots with any damping.
     fn roots_of_states(
         &self,
@@ -326,11 +504,24 @@ impl LinearizedMotion<'_> {
         count: usize,
         time: &Limit,
     ) -> Option<Vec<MotionRoot>> {
+        let eigenvalues = self.eigenpairs_of_states(factors, 2 * count, time)?.values;
+        let upper = eigenvalues.iter().map(|it| it.eigenvalue);
+        let upper = upper.filter(|mu| mu.im >= 0.0);
+        Some(upper.map(|mu| MotionRoot::new(mu.finv())).collect())
+    }
+
+    /// The eigenpairs of the map of states (q, p) of largest eigenvalues, conjugate ones both.
+    pub(super) fn eigenpairs_of_states(
+        &self,
+        factors: &mut MatrixFactors,
+        count: usize,
+        time: &Limit,
+    ) -> Option<RitzPairs> {
         let size = self.solver.size();
         let mut starts = Vec::new();
-        for number in 0..SEARCH.starts {
+        for number in 0..STARTS {
             let mut start = self.inverse(factors, &self.start(number))?;
-            start.extend(self.inverse(factors, &self.start(number + SEARCH.starts))?);
+            start.extend(self.inverse(factors, &self.start(number + STARTS))?);
             starts.push(start);
         }
         let apply = &mut |state: &[f64]| {
@@ -341,118 +532,36 @@ impl LinearizedMotion<'_> {
             image.extend_from_slice(q);
             Some(image)
         };
-        let eigenvalues = largest_eigenvalues(starts, 2 * count, apply, time)?;
-        let upper = eigenvalues.iter().map(|it| it.eigenvalue);
-        let upper = upper.filter(|mu| mu.im >= 0.0);
-        Some(upper.map(|mu| MotionRoot::new(mu.finv())).collect())
+        largest_eigenvalues(starts, count, apply, time)
     }
-}
 
-/// The eigenvalues of largest size of a matrix that is known by its products, conjugate ones both, at
-/// least `count` if there are so many besides zero: by the Arnoldi method from several starts at once (a
-/// band matrix in place of Hessenberg's).
-fn largest_eigenvalues(
-    starts: Vec<Vec<f64>>,
-    count: usize,
-    apply: &mut dyn FnMut(&[f64]) -> Option<Vec<f64>>,
-    time: &Limit,
-) -> Option<Vec<RitzValue>> {
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    let mut columns: Vec<Vec<f64>> = Vec::new();
-    for mut start in starts {
-        orthogonalize(&mut start, &mut basis);
-    }
-    loop {
-        let done = columns.len();
-        let exhausted = done == basis.len();
-        let full = done == SEARCH.most_directions;
-        let looks = done >= 2 * count && done.is_multiple_of(SEARCH.check_every);
-        if looks || exhausted || full {
-            let found = ritz_values(&columns, basis.len())?;
-            // A conjugate pair is not parted.
-            let parts = |it: &RitzValue| it.eigenvalue.im != 0.0;
-            let pairs = found.iter().take(count).filter(|it| parts(it)).count() % 2;
-            let count = count + pairs;
-            let wanted = found.iter().take(count);
-            let converged = |it: &RitzValue| it.residual <= SEARCH.accuracy * it.eigenvalue.norm();
-            if exhausted || found.len() >= count && wanted.into_iter().all(converged) {
-                return Some(found.into_iter().take(count).collect());
-            }
-        }
-        if full || time.reached() {
-            return None;
-        }
-        let mut image = apply(&basis[done])?;
-        columns.push(orthogonalize(&mut image, &mut basis));
-        if columns[done].iter().any(|value| !value.is_finite()) {
-            return None;
+    /// (lambda^2 M + lambda C + K - W) times a complex vector, and the same differentiated by lambda.
+    pub(super) fn polynomial(&self, lambda: c64, vector: &[c64]) -> PolynomialProduct {
+        let parts = [|it: &c64| it.re, |it: &c64| it.im];
+        let parts = parts.map(|of| vector.iter().map(of).collect::<Vec<f64>>());
+        let complex = |product: &dyn Fn(&[f64]) -> Vec<f64>| -> Vec<c64> {
+            let [re, im] = [product(&parts[0]), product(&parts[1])];
+            re.into_iter()
+                .zip(im)
+                .map(|(re, im)| c64::new(re, im))
+                .collect()
+        };
+        let masses = complex(&|v| self.masses.times(v));
+        let damping = complex(&|v| self.damping(v));
+        let stiffness = complex(&|v| {
+            let stiff = self.vector(&self.solver.product(&self.system, &self.field(v)));
+            let without = self.force_derivative(v);
+            stiff.iter().zip(without).map(|(k, w)| k - w).collect()
+        });
+        let all = masses.iter().zip(&damping).zip(&stiffness);
+        let value = |((m, c), k): ((&c64, &c64), &c64)| lambda * (lambda * m + c) + k;
+        let slope = |(m, c): (&c64, &c64)| 2.0 * lambda * m + c;
+        PolynomialProduct {
+            value: all.map(value).collect(),
+            slope: masses.iter().zip(&damping).map(slope).collect(),
         }
     }
 }
 
-/// Appends the part of a vector that is orthogonal to a basis to it, unless there is none; returns the
-/// coefficients of the vector.
-fn orthogonalize(vector: &mut [f64], basis: &mut Vec<Vec<f64>>) -> Vec<f64> {
-    let dot = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
-    let whole = dot(vector, vector).sqrt();
-    let mut coefficients = vec![0.0; basis.len()];
-    // Twice is enough (Giraud et al., Numer. Math. 101, 2005).
-    for _ in 0..2 {
-        for (coefficient, direction) in coefficients.iter_mut().zip(&*basis) {
-            let part = dot(direction, vector);
-            *coefficient += part;
-            (vector.iter_mut().zip(direction)).for_each(|(v, d)| *v -= part * d);
-        }
-    }
-    let left = dot(vector, vector).sqrt();
-    if left > SEARCH.exhausted * whole {
-        vector.iter_mut().for_each(|value| *value /= left);
-        basis.push(vector.to_vec());
-        coefficients.push(left);
-    }
-    coefficients
-}
-
-/// An approximate eigenvalue, and the norm of its residual.
-struct RitzValue {
-    eigenvalue: c64,
-    residual: f64,
-    /// The eigenvector in the basis, of unit length.
-    vector: Vec<c64>,
-}
-
-impl RitzValue {
-    /// Cosine of the angle between two eigenvectors.
-    fn alignment(&self, other: &RitzValue) -> f64 {
-        let both = self.vector.iter().zip(&other.vector);
-        both.map(|(a, b)| a.conj() * b).sum::<c64>().norm()
-    }
-}
-
-/// The approximate eigenvalues but for those that are zero, the largest first, from the coefficients of the
-/// images of so many directions in a basis of `size` vectors.
-fn ritz_values(columns: &[Vec<f64>], size: usize) -> Option<Vec<RitzValue>> {
-    let done = columns.len();
-    let entry = |r: usize, c: usize| columns[c].get(r).copied().unwrap_or(0.0);
-    let eigen = Mat::from_fn(done, done, entry).eigen().ok()?;
-    let (vectors, values) = (eigen.U(), eigen.S().column_vector());
-    let mut found: Vec<RitzValue> = (0..done)
-        .filter(|&k| values[k].norm() > 0.0)
-        .map(|k| {
-            let vector: Vec<c64> = (0..done).map(|c| vectors[(c, k)]).collect();
-            let length = vector.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
-            let vector: Vec<c64> = vector.into_iter().map(|v| v / length).collect();
-            let beyond = (done..size).map(|r| {
-                let parts = vector.iter().enumerate().map(|(c, v)| *v * entry(r, c));
-                parts.sum::<c64>().norm_sqr()
-            });
-            RitzValue {
-                eigenvalue: values[k],
-                residual: beyond.sum::<f64>().sqrt(),
-                vector,
-            }
-        })
-        .collect();
-    found.sort_by(|a, b| b.eigenvalue.norm().total_cmp(&a.eigenvalue.norm()));
-    Some(found)
-}
+#[cfg(test)]
+mod tests;

@@ -15,8 +15,11 @@
 //! be proved is not returned. Eigenvalues themselves are Rayleigh quotients of the shapes in mixed form,
 //! in which no large stiffness enters.
 
+mod arnoldi;
 mod lanczos;
 pub(crate) mod linearized;
+pub(crate) mod motion_pairs;
+mod node_blocks;
 
 use crate::leaf::{
     DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System,

@@ -136,9 +136,13 @@ fn relax_with_progress(
         let why = remark.map_or_else(|| leaf.outcome.word().into(), ToString::to_string);
         return Ok(Err(ContinuationFailure::NotAtRest(why)));
     }
-    let follows = found.levels.iter().any(|level| level.leaf.has_followers());
-    if follows && leaf.stable() == Some(false) {
-        let why = "small motions about it grow under loads that turn with the section";
+    let any = |has: fn(&DiscreteLeaf) -> bool| found.levels.iter().any(|level| has(&level.leaf));
+    let windy = any(|leaf| leaf.leaf.in_wind());
+    if (windy || any(DiscreteLeaf::has_followers)) && leaf.stable() == Some(false) {
+        let why = match windy {
+            true => "small motions about it grow in the wind",
+            false => "small motions about it grow under loads that turn with the section",
+        };
         return Ok(Err(ContinuationFailure::NotAtRest(why.into())));
     }
     Ok(Ok(found))

@@ -64,9 +64,10 @@ pub(crate) use crate::relax::saddle::{
     INDEFINITE_NEWTON_EQUATIONS, NOISY_EIGENVALUE_THRESHOLD, converge_saddle,
 };
 pub(crate) use crate::relax::sensitivity::{
-    NeighbouringEquilibria, Parameter, sensitivities, unit_forces,
+    NeighbouringEquilibria, NeighbouringScenario, Parameter, sensitivities, unit_forces,
 };
 pub(crate) use crate::relax::shooting::{START_TOLERANCE, check_intervals};
+pub(crate) use crate::relax::small_motions::small_motion_pairs;
 pub use crate::relax::small_motions::{DominantMotion, MotionInstability, SmallMotions};
 pub(crate) use crate::relax::solve_on_grid::check_segments;
 pub(crate) use crate::relax::solve_on_grid::start::initial_state;

@@ -514,6 +514,8 @@ pub struct MotionVerdict {
     pub stable: Option<bool>,
     /// How the one that grows fastest does.
     pub instability: Option<MotionInstability>,
+    /// Whether growing ones were looked for among all of a coarse grid.
+    pub complete: bool,
     /// What is assumed of masses and damping.
     pub assumed: AssumedMotion,
 }
@@ -528,6 +530,7 @@ impl EquilibriumRemark {
             *verdict = Some(MotionVerdict {
                 stable: motions.stable,
                 instability: motions.instability,
+                complete: motions.complete,
                 assumed: motions.assumed,
             });
         }
@@ -549,6 +552,9 @@ fn verdict_text(verdict: Option<MotionVerdict>) -> String {
         (Some(true), _) => "none grows",
         (_, Some(MotionInstability::Flutter)) => "oscillations grow (flutter)",
         (_, Some(MotionInstability::Divergence)) => "one grows without oscillations (divergence)",
+        _ if !verdict.complete => {
+            "none of the slowest grows, and whether a faster one does is not known"
+        }
         _ => "whether one grows is within the error of its growth rate",
     };
     format!("stability is that of the small motions about the equilibrium, {given}: {told}")

@@ -8,6 +8,7 @@ use crate::leaf::{
     displacement_part, rotation_part,
 };
 use crate::modes::Eigenpair;
+use crate::modes::motion_pairs::MotionPair;
 use crate::motion::Physics;
 use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
@@ -18,6 +19,7 @@ use crate::relax::result::forces::{GripReaction, Reaction};
 use crate::relax::solve_on_grid::follower_loads::WithoutPotential;
 use crate::scenario::{Grip, Scenario, SupportKind};
 use crate::{modes, rotation};
+use faer::c64;
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -318,9 +320,7 @@ impl SensitivityGrid<'_> {
     ) -> Vec<DVec3> {
         let GridLevel { leaf, state } = self.level;
         let mut all = match near.filter(|_| leaf.leaf.in_wind()) {
-            Some(near) => {
-                near.vector_derivatives(self.level, |leaf, state| vec![leaf.reaction(state).force])
-            }
+            Some(near) => vec![near.reaction_force_rate(self.level)],
             None => vec![leaf.reaction_rate(state, rate, response)],
         };
         if has_clamped_tip(&leaf.leaf) {
@@ -344,10 +344,7 @@ impl SensitivityGrid<'_> {
             return Vec::new();
         }
         let forces = match near.filter(|_| leaf.leaf.in_wind()) {
-            Some(near) => near.vector_derivatives(self.level, |leaf, state| {
-                let reactions = leaf.grip_reactions(state).into_iter();
-                reactions.map(|on_grip| on_grip.force).collect()
-            }),
+            Some(near) => near.grip_force_rates(self.level),
             None => leaf.grip_force_rates(state, rate, response),
         };
         let clamped = near.filter(|_| has_clamped_grips(&leaf.leaf));
@@ -478,6 +475,20 @@ impl NeighbouringEquilibria {
         self.0.iter().map(term).sum()
     }
 
+    /// The derivative of the root of a small motion, per time of the scenario; not a number if memory is short.
+    pub fn root_rate(&self, level: &GridLevel, motion: &MotionPair) -> c64 {
+        let (own, _) = Physics::for_small_motions(&level.leaf.leaf);
+        let term = |near: &NeighbouringEquilibrium| {
+            let (physics, _) = Physics::for_small_motions(&near.leaf.leaf);
+            let forces = WithoutPotential::in_motion(&near.leaf, &physics);
+            let ratio = physics.time_unit / own.time_unit;
+            let unbalanced = motion.unbalanced(&near.leaf, &physics, &near.state, &forces, ratio);
+            let unbalanced = unbalanced.unwrap_or(c64::new(f64::NAN, f64::NAN));
+            -near.weight * unbalanced / own.time_unit
+        };
+        self.0.iter().map(term).sum()
+    }
+
     /// The derivatives of the eigenvalues of several modes. NaN where a multiple eigenvalue splits: its modes change
     /// differently, and the lower one is another mode on either side.
     fn eigenvalue_rates(&self, modes: &[Eigenpair]) -> Vec<f64> {
@@ -505,6 +516,20 @@ impl NeighbouringEquilibria {
             }
         }
         rates
+    }
+
+    /// The derivative of the force on the holder of the tip, on which also the drag next to it acts.
+    pub fn reaction_force_rate(&self, level: &GridLevel) -> DVec3 {
+        let rates = self.vector_derivatives(level, |leaf, state| vec![leaf.reaction(state).force]);
+        rates[0]
+    }
+
+    /// The derivatives of the forces on grips, on which also the drag on their nodes acts.
+    pub fn grip_force_rates(&self, level: &GridLevel) -> Vec<DVec3> {
+        self.vector_derivatives(level, |leaf, state| {
+            let reactions = leaf.grip_reactions(state).into_iter();
+            reactions.map(|on_grip| on_grip.force).collect()
+        })
     }
 
     /// The derivatives of the moments of the rods on a clamp.

@@ -2,17 +2,24 @@
 //! ([`crate::modes`]), on its grids and extrapolated.
 
 use crate::leaf::DiscreteLeaf;
-use crate::modes::linearized::{MotionRoot, MotionRoots, Square, lowest_roots};
+use crate::modes::linearized::{
+    MOST_DENSE_STATES, MotionRoot, MotionRoots, Square, all_roots, lowest_roots, states_per_node,
+};
+use crate::modes::motion_pairs::{MotionPair, lowest_pairs};
 use crate::motion::{AssumedMotion, Physics};
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
-use crate::relax::solve_on_grid::follower_loads::{WithoutPotential, balance_on_next_grid};
+use crate::relax::solve_on_grid::follower_loads::{
+    WithoutPotential, balance_on_coarse_grid, balance_on_next_grid,
+};
+use crate::run::Limit;
 use crate::words;
 use faer::c64;
 use serde::{Serialize, Serializer};
 use std::borrow::Cow;
+use std::cell::Cell;
 
 words! {
     /// How a leaf leaves an unstable equilibrium.
@@ -24,8 +31,31 @@ words! {
     }
 }
 
-/// Roots that are computed even if fewer are requested: one of the lowest modes is the first that grows.
+/// Roots that are computed even if fewer are requested: mostly one of the lowest modes is the first that grows.
 pub const LEAST_ROOTS: usize = 8;
+
+/// How growing motions are looked for among all of a coarse grid.
+struct GrowthSurvey {
+    /// Segments of the coarsest and of the finest grid on which all roots are computed.
+    segments: [usize; 2],
+    /// Growth, as a part of the size of a root, that counts.
+    growth: f64,
+    /// Growth besides that rounding makes of two equal frequencies: of a root as small as the smallest, of others times
+    /// the square of their ratio.
+    rounding: f64,
+    /// Roots beyond the first one that grows, which may have another place on finer grids.
+    further: usize,
+    /// Largest number of roots that are then computed on all grids.
+    most_roots: usize,
+}
+
+const SURVEY: GrowthSurvey = GrowthSurvey {
+    segments: [4, 16],
+    growth: 1e-3,
+    rounding: 1e-9,
+    further: 4,
+    most_roots: 60,
+};
 
 /// Growth of a damped motion, as a part of the size of its root, that is rounding.
 const GROWTH_ROUNDING: f64 = 1e-8;
@@ -49,6 +79,9 @@ pub struct SmallMotions {
     pub unstable_roots: Option<usize>,
     /// The motion that grows fastest or, if none grows, decays slowest.
     pub dominant: Option<DominantMotion>,
+    /// Whether growing motions were looked for among all of a coarse grid. Otherwise only the slowest are known; of a
+    /// leaf too large for such a grid `stable` is `None` if none of these grows.
+    pub complete: bool,
     /// What is assumed of masses and damping.
     pub assumed: AssumedMotion,
 }
@@ -188,14 +221,25 @@ pub fn small_motions(
     found: &NestedEquilibrium,
 ) -> Option<SmallMotions> {
     let (physics, assumed) = Physics::for_small_motions(problem.leaf);
-    let count = LEAST_ROOTS.max(problem.options.modes);
+    let usual = LEAST_ROOTS.max(problem.options.modes);
+    let reach = growth_reach(problem, found, &physics);
+    let wanted = match reach {
+        GrowthReach::Within(count) if count <= SURVEY.most_roots => count.max(usual),
+        _ => usual,
+    };
+    let found_all = Cell::new(true);
     let on = |level: &GridLevel| {
         if unknowns(&level.leaf) > UNKNOWNS.without_shapes {
             return None;
         }
         let forces = WithoutPotential::in_motion(&level.leaf, &physics);
         let limit = &problem.options.limit;
-        lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit)
+        let lowest =
+            |count| lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit);
+        lowest(wanted).or_else(|| {
+            found_all.set(wanted == usual);
+            if wanted > usual { lowest(usual) } else { None }
+        })
     };
     let skipped = found.levels.len().saturating_sub(EXTRAPOLATED_GRIDS);
     let mut series = RootSeries::default();
@@ -225,9 +269,17 @@ pub fn small_motions(
         finest = Cow::Owned(next);
     }
     let grow: Vec<Option<bool>> = roots.iter().map(|it| it.grows).collect();
+    let (certain, complete) = match reach {
+        GrowthReach::Within(reach) => {
+            let reached = reach <= wanted && found_all.get();
+            (reached, reached)
+        }
+        GrowthReach::NotComputed => (true, false),
+        GrowthReach::TooLarge => (false, false),
+    };
     let stable = match grow.contains(&Some(true)) {
         true => Some(false),
-        false => (!grow.contains(&None)).then_some(true),
+        false => (certain && !grow.contains(&None)).then_some(true),
     };
     let fastest = (roots.iter().zip(&grow)).filter(|(_, grows)| **grows == Some(true));
     let fastest = fastest.max_by(|(a, _), (b, _)| a.root.growth.total_cmp(&b.root.growth));
@@ -267,8 +319,69 @@ pub fn small_motions(
             .collect(),
         stable,
         instability,
+        complete,
         assumed,
     })
+}
+
+/// So many small motions of a leaf at rest on a grid next to zero, which can be differentiated; `None` if they are
+/// not found.
+pub(crate) fn small_motion_pairs(level: &GridLevel, count: usize) -> Option<Vec<MotionPair>> {
+    let GridLevel { leaf, state } = level;
+    let (physics, _) = Physics::for_small_motions(&leaf.leaf);
+    let forces = WithoutPotential::in_motion(leaf, &physics);
+    lowest_pairs(leaf, &physics, state, &forces, count, &Limit::default())
+}
+
+/// How many of the roots nearest to zero have one that grows among them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum GrowthReach {
+    /// So many, by all roots of a coarse grid; none if none grows.
+    Within(usize),
+    /// The leaf is not balanced on a coarse grid, or its dense matrix is singular: the slowest motions decide.
+    NotComputed,
+    /// The leaf has too many unknowns on any grid.
+    TooLarge,
+}
+
+/// Where among all roots on a coarse grid the first is that grows.
+fn growth_reach(
+    problem: &RelaxationProblem,
+    found: &NestedEquilibrium,
+    physics: &Physics,
+) -> GrowthReach {
+    let Some(first) = found.levels.first() else {
+        return GrowthReach::NotComputed;
+    };
+    let [least, most] = SURVEY.segments;
+    let states = states_per_node(&first.leaf, physics) * first.leaf.rods();
+    let segments = most.min(MOST_DENSE_STATES / states);
+    let level = match first.leaf.segments() <= segments {
+        true => Some(Cow::Borrowed(first)),
+        false if segments < least => return GrowthReach::TooLarge,
+        false => balance_on_coarse_grid(first, segments, &problem.options.limit).map(Cow::Owned),
+    };
+    let roots = level.and_then(|level| {
+        let forces = WithoutPotential::in_motion(&level.leaf, physics);
+        all_roots(&level.leaf, physics, &level.state, &forces)
+    });
+    let Some(roots) = roots else {
+        return GrowthReach::NotComputed;
+    };
+    let roots: Vec<MotionRoot> = match roots {
+        MotionRoots::Squares(squares) => {
+            let roots = squares.iter().map(|it| MotionRoot::from_square(it.value));
+            roots.collect()
+        }
+        MotionRoots::Damped(roots) => roots,
+    };
+    let smallest = roots.first().map_or(0.0, |it| it.size());
+    let grows = |it: &MotionRoot| {
+        let rounding = SURVEY.rounding * (it.size() / smallest).powi(2);
+        it.growth > (SURVEY.growth + rounding) * it.size()
+    };
+    let first = roots.iter().position(grows);
+    GrowthReach::Within(first.map_or(0, |first| first + 1 + SURVEY.further))
 }
 
 /// Roots with damping, of which real and imaginary part are extrapolated. They pass zero growth without

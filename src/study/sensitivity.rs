@@ -2,7 +2,7 @@
 
 use crate::relax::{
     Equilibrium, EquilibriumDoubt, EquilibriumTracker, Options, Parameter, Progress, RelaxError,
-    RelaxedLeaf, Sensitivity, relax_on_grids, sensitivities, without_wind_or_followers,
+    RelaxedLeaf, Sensitivity, relax_on_grids, sensitivities,
 };
 use crate::scenario::Scenario;
 use crate::study::{BaseScenario, ParameterKeys, VaryError};
@@ -63,20 +63,18 @@ pub fn relax_with_sensitivities(
 }
 
 /// Derivatives of the tip, the energy and the lowest eigenvalue of a leaf that is followed, where
-/// `base` has it now.
+/// `base` has it now; the energy is not a number where loads have no potential.
 pub fn sensitivities_of_tracker(
     follower: &EquilibriumTracker,
     base: &BaseScenario,
     keys: &[ParameterKeys],
 ) -> Result<Vec<Sensitivity>, SensitivityError> {
-    let scenario = base.scenario();
-    without_wind_or_followers(scenario, "a derivative")?;
     let values = values_of_keys(base, keys)?;
     let numbers = named_parameters(base, &values);
     Ok(sensitivities(
         follower.levels(),
         &numbers,
-        scenario.tolerance,
+        base.scenario().tolerance,
         0,
     ))
 }

@@ -1,6 +1,6 @@
 //! Fits of leaves under loads that turn with the section.
 
-use leafdyn::study::{FitOutcome, fit};
+use leafdyn::study::FitOutcome;
 use leafdyn_testing::fit::{fitted, gives_back, pulls, request, within_bars};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
@@ -49,20 +49,4 @@ fn numbers_come_back_from_tips() {
             false => within_bars(&found, &WANTED, 2.5),
         }
     }
-}
-
-/// What has no modes has no frequencies, and wind is not fitted in.
-#[test]
-fn what_is_not_there_is_refused() {
-    let said = |text: &str, table: &str| {
-        let asked = request(base(text, ""), &[table], &["stiffness.torsion"]);
-        fit(&asked, &mut |_| {}).unwrap_err().to_string()
-    };
-    let found = said(VEINS, "frequency_1,sd_frequency_1\n0.5,0.01\n");
-    assert!(found.contains("leave out the frequencies"), "{found}");
-    let windy = format!(
-        "{VEINS}\nwind = {{ velocity = [0.5, 0.8, 1.0], density = 1.2, drag = 2.0, width = 0.2 }}"
-    );
-    let found = said(&windy, "tip_x,sd_tip_x\n0.5,0.01\n");
-    assert!(found.contains("a fit does not take wind"), "{found}");
 }

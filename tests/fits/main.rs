@@ -13,6 +13,8 @@ mod next;
 mod numbers;
 mod photograph;
 mod refusals;
+mod small_motions;
 mod starts;
 mod undetermined_family;
+mod wind;
 mod work;

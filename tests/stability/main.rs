@@ -8,6 +8,7 @@ mod branch_ends;
 mod eigenvalue_bars;
 mod flutter;
 mod follower;
+mod growing_motions;
 mod hinges;
 mod lateral_buckling;
 mod load_order;

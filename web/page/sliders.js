@@ -278,7 +278,7 @@ function marginsSlider(value) {
 const OF_ONE_VEIN = /^(leaf|stiffness|section|blade|rest|coupling|tissue|dynamics|foundation)\..*\[/;
 /// Growth of all veins alike is another length.
 const OF_LENGTH = /^(scale:)?rest\.stretch$/;
-/// What one moves first where effects are not known, as in wind: the first number of each kind.
+/// What one moves first where effects are not known, as of a leaf that does not rest: the first number of each kind.
 const USUAL = [/^load\.g(ravity)?\[/, /^wind\.velocity/, /^load\.tip_force/, /young|bending_2/, /thickness/, /^(leaf|blade)\.length/];
 /// Effects that differ by a smaller part are those of one number by two names.
 const ONE_EFFECT = 1e-6;

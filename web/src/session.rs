@@ -22,6 +22,9 @@ const TOLERANCE: f64 = 1e-4;
 /// Seconds after which a leaf that does not come to rest is given up.
 const PATIENCE: u64 = 8;
 
+/// Seconds after which the rest in wind is given up, of which only effects are wanted.
+const PATIENCE_IN_WIND: u64 = 2;
+
 /// Points of a branch that are drawn, and seconds for all that is asked in the background.
 const MOST_POINTS: usize = 400;
 const SECONDS: u64 = 20;
@@ -263,10 +266,26 @@ impl Open {
         numbers.into_iter().map(slider).collect()
     }
 
+    /// The leaf at rest in its steady wind, in which its numbers have other effects than without it; none
+    /// without wind, in one that changes, and where it does not come to rest soon.
+    fn blown(&self) -> Option<EquilibriumTracker> {
+        let wind = self.scenario.wind.as_ref()?;
+        let how = Options {
+            limit: within(PATIENCE_IN_WIND),
+            ..options(&self.scenario, 0)
+        };
+        let steady = wind.velocity.is_constant();
+        let (_, found) = steady.then(|| EquilibriumTracker::begin(&self.scenario, &how).ok())??;
+        found
+    }
+
     /// How far any point of the leaf moves, in lengths, by a change of each number by its own size: of
-    /// those that can be differentiated.
+    /// those that can be differentiated. In a steady wind of the leaf at rest in it.
     fn effects(&self, numbers: &[ScenarioNumber]) -> HashMap<String, f64> {
-        let (Some(follower), Ok(base)) = (&self.follower, self.fixed(None)) else {
+        let blown = self.blown();
+        let (Some(follower), Ok(base)) =
+            (blown.as_ref().or(self.follower.as_ref()), self.fixed(None))
+        else {
             return HashMap::new();
         };
         let sized = numbers.iter().filter(|number| number.value != 0.0);
@@ -429,7 +448,8 @@ impl Open {
     }
 
     fn sensitivity(&self, keys: &[String]) -> Result<Answer, Refusal> {
-        let Some(follower) = &self.follower else {
+        let blown = self.blown();
+        let Some(follower) = blown.as_ref().or(self.follower.as_ref()) else {
             return refuse("the leaf is not at rest");
         };
         let keys = keys.iter().map(|key| key.parse());

@@ -149,6 +149,38 @@ fn a_leaf_under_a_moment_is_not_said_to_be_left() {
     }
 }
 
+/// In a steady wind sliders have their effects on the leaf at rest in it, also those of the wind; without it, and in
+/// one that changes, on the leaf at rest without it.
+#[test]
+fn sliders_have_effects_in_wind() {
+    let text = |speed: &str| {
+        format!("{COLUMN}\nwind = {{ velocity = {speed}, density = 1.0, drag = 2.0, width = 0.4 }}")
+    };
+    let effect = |text: &str, key: &str| {
+        let mut session = Session::default();
+        let opened = ask(
+            &mut session,
+            json!({ "ask": "open", "text": text, "name": "windy.toml" }),
+        );
+        assert_eq!(opened["answer"], "opened", "{}", opened["error"]);
+        let sliders = opened["sliders"].as_array().unwrap();
+        let slider = sliders.iter().find(|slider| slider["key"] == key);
+        slider.and_then(|slider| slider["effect"].as_f64())
+    };
+    let key = "load.tip_force[2]";
+    let steady = text("[0.0, 1.5, 0.0]");
+    let of_speed = effect(&steady, "wind.velocity[1]").unwrap();
+    assert!(of_speed > 1e-2, "{of_speed}");
+    let [calm, blown] = [COLUMN, &steady].map(|text| effect(text, key).unwrap());
+    assert!(
+        blown > 0.0 && (blown - calm).abs() > 1e-3 * calm,
+        "{calm} {blown}"
+    );
+    let gust = text("{ at = [0.0, 1.0], value = [[0.0, 0.0, 0.0], [0.0, 1.5, 0.0]] }");
+    let without = effect(&gust, key).unwrap();
+    assert!((without - calm).abs() < 1e-6 * calm, "{calm} {without}");
+}
+
 /// Whatever is asked in whatever order, there is an answer, and the leaf goes on.
 #[test]
 fn a_refused_question_leaves_the_leaf_as_it_is() {

@@ -37,7 +37,7 @@ pub fn refusal_with_option_names(refusal: Refusal) -> Refusal {
     }
     if let Some(wind @ UnmodelledFeature::Wind { what }) = find_cause(&refusal) {
         let with_options = format!(
-            "[wind]: {what} does not take wind into account: simulate does, and relax, trace and check in a steady one; leave it out"
+            "[wind]: {what} does not take wind into account: simulate does, and relax, trace, check and fit in a steady one; leave it out"
         );
         let message = refusal.to_string();
         return message.replace(&wind.to_string(), &with_options).into();

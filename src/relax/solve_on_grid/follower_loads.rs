@@ -7,14 +7,14 @@
 
 use crate::homotopy::{StepEnd, StepSizes};
 use crate::leaf::{
-    DiscreteLeaf, Loads, NodalField, NodeFreedom, State, System, add_to_increment,
+    DiscreteLeaf, Grid, Loads, NodalField, NodeFreedom, State, System, add_to_increment,
     displacement_part,
 };
 use crate::motion::{Physics, SegmentDrag, WindDrag};
 use crate::newton::{
     EquilibriumFailure, FollowerForces, NewtonEquations, NewtonIteration, SolverCounts,
 };
-use crate::relax::accuracy::transfer::{GridLevel, prolong};
+use crate::relax::accuracy::transfer::{GridLevel, prolong, transfer};
 use crate::relax::path::LoadOrder;
 use crate::relax::same_equilibrium::is_near_guess;
 use crate::relax::solve_on_grid::start::GridRelaxation;
@@ -294,8 +294,29 @@ fn balance_within(
 
 /// An equilibrium continued to the grid next to its own; `None` if Newton's method leads elsewhere.
 pub fn balance_on_next_grid(level: &GridLevel, limit: &Limit) -> Option<GridLevel> {
-    let leaf = DiscreteLeaf::new(&level.leaf.leaf, level.leaf.grid.refined());
-    let mut guess = prolong(&level.leaf, &level.state);
+    let guess = prolong(&level.leaf, &level.state);
+    balance_on_grid_nearby(level, level.leaf.grid.refined(), guess, limit)
+}
+
+/// An equilibrium continued to a coarse grid of so many segments; `None` if Newton's method leads elsewhere.
+pub fn balance_on_coarse_grid(
+    level: &GridLevel,
+    segments: usize,
+    limit: &Limit,
+) -> Option<GridLevel> {
+    let grid = Grid::new(segments, level.leaf.leaf.kinks());
+    let guess = transfer(&level.leaf, &level.state, &grid);
+    balance_on_grid_nearby(level, grid, guess, limit)
+}
+
+/// An equilibrium continued to another grid, from a guess there.
+fn balance_on_grid_nearby(
+    level: &GridLevel,
+    grid: Grid,
+    mut guess: State,
+    limit: &Limit,
+) -> Option<GridLevel> {
+    let leaf = DiscreteLeaf::new(&level.leaf.leaf, grid);
     leaf.place_held_nodes(&mut guess);
     let (mut system, mut work) = (System::new(&leaf), SolverCounts::default());
     let mut ignored = |_, _| {};
@@ -488,7 +509,7 @@ impl LoadLeg {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::leaf::{DirectSolver, Grid, Leaf};
+    use crate::leaf::{DirectSolver, Leaf};
     use crate::relax::initial_state;
     use crate::scenario::Scenario;
 

@@ -7,14 +7,18 @@
 
 use crate::leaf::{Leaf, LeafParameterDerivative, LinearResponse, displacement_part};
 use crate::relax::{
-    ContinuationFailure, GridLevel, GridPolicy, NeighbouringEquilibria, Parameter, unit_forces,
+    ContinuationFailure, GridLevel, GridPolicy, NeighbouringEquilibria, NeighbouringScenario,
+    Parameter, unit_forces,
 };
 use crate::scenario::PhotoParameterDerivative;
 use crate::study::ParameterKeys;
 use crate::study::fit::columns::MeasuredQuantity;
 use crate::study::fit::model::{FitModel, FitPoint, ScenarioDerivative};
-use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ParameterResponses, ScalarDatum};
+use crate::study::fit::prediction::{
+    CaseSolution, DatumQuantity, ParameterResponses, ScalarDatum, Vibrations,
+};
 use rayon::prelude::*;
+use std::f64::consts::TAU;
 use std::sync::OnceLock;
 
 /// Derivatives in a search have the accuracy of those of a leaf with this tolerance.
@@ -211,8 +215,7 @@ impl CaseSolution {
     /// respect to all numbers. `None` if solving for each number takes no more work.
     pub fn measured_tip_axes(&self, numbers: usize) -> Option<Vec<usize>> {
         let leaf = &self.equilibrium.levels[0].leaf;
-        let symmetric =
-            !leaf.leaf.has_placed_supports() && !leaf.has_moments() && !leaf.has_followers();
+        let symmetric = !leaf.leaf.has_placed_supports() && leaf.leaf.has_potential();
         let tip = |component: &ScalarDatum| match component.quantity {
             DatumQuantity::Result(MeasuredQuantity::Tip(axis)) => Some(axis),
             _ => None,
@@ -252,6 +255,13 @@ impl CaseSolution {
         Ok(self.scalar_data.iter().map(row).collect())
     }
 
+    /// In wind the scenarios between which forces on supports are differences, as these bear the drag on their
+    /// nodes too; none of leaves without wind.
+    fn scenarios_of_drag(&self, number: &Parameter) -> Option<Vec<NeighbouringScenario>> {
+        let windy = self.equilibrium.levels[0].leaf.leaf.in_wind();
+        windy.then(|| number.neighbouring_scenarios().unwrap_or_default())
+    }
+
     /// The derivative of a result with respect to a number of the scenario.
     pub fn result_derivative(
         &self,
@@ -272,32 +282,47 @@ impl CaseSolution {
                 self.equilibrium.extrapolated_value(tip)[axis] * self.leaf_length()
             }
             MeasuredQuantity::Reaction(axis) => {
-                let force = |k: usize, level: &GridLevel| {
-                    level.leaf.reaction_rate(&level.state, rate, &responses[k])
+                let scenarios = self.scenarios_of_drag(number);
+                let force = |k: usize, level: &GridLevel| match &scenarios {
+                    Some(near) => NeighbouringEquilibria::new(level, near, rate, &responses[k])
+                        .reaction_force_rate(level),
+                    None => level.leaf.reaction_rate(&level.state, rate, &responses[k]),
                 };
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Grip(grip, axis) => {
-                let force = |k: usize, level: &GridLevel| {
-                    let GridLevel { leaf, state } = level;
-                    leaf.grip_force_rates(state, rate, &responses[k])[grip]
+                let scenarios = self.scenarios_of_drag(number);
+                let force = |k: usize, level: &GridLevel| match &scenarios {
+                    Some(near) => NeighbouringEquilibria::new(level, near, rate, &responses[k])
+                        .grip_force_rates(level)[grip],
+                    None => {
+                        let GridLevel { leaf, state } = level;
+                        leaf.grip_force_rates(state, rate, &responses[k])[grip]
+                    }
                 };
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Frequency(mode) => {
                 let scenarios = number.neighbouring_scenarios().unwrap_or_default();
-                let of = |k: usize| {
-                    let near = NeighbouringEquilibria::new(
-                        &self.equilibrium.levels[k],
-                        &scenarios,
-                        rate,
-                        &responses[k],
-                    );
-                    near.eigenvalue_rate(&self.modes[k][mode - 1])
+                let near = |k: usize| {
+                    let level = &self.equilibrium.levels[k];
+                    NeighbouringEquilibria::new(level, &scenarios, rate, &responses[k])
                 };
-                // omega^2 = (2 pi f)^2.
-                let frequency = self.predicted_result(quantity);
-                self.extrapolate_over_grids(of) / (2.0 * std::f64::consts::TAU.powi(2) * frequency)
+                match &self.vibrations {
+                    Vibrations::Modes(modes) => {
+                        let of = |k: usize| near(k).eigenvalue_rate(&modes[k][mode - 1]);
+                        // omega^2 = (2 pi f)^2.
+                        let frequency = self.predicted_result(quantity);
+                        self.extrapolate_over_grids(of) / (2.0 * TAU.powi(2) * frequency)
+                    }
+                    Vibrations::Motions(motions) => {
+                        let of = |k: usize| {
+                            let level = &self.equilibrium.levels[k];
+                            near(k).root_rate(level, &motions[k][mode - 1]).im
+                        };
+                        self.extrapolate_over_grids(of) / TAU
+                    }
+                }
             }
         }
     }

@@ -23,7 +23,7 @@ mod statistics;
 pub(super) mod table;
 
 use crate::relax::{Options, RelaxError, check_tolerance};
-use crate::run::{Instant, Limit, UnmodelledFeature};
+use crate::run::{Instant, Limit};
 use crate::study::BaseScenario;
 use crate::study::fit::columns::FitError;
 pub use crate::study::fit::columns::{
@@ -91,9 +91,6 @@ pub fn fit(request: &FitRequest, progress: &mut dyn FnMut(&FitStep)) -> Result<F
     let base = &request.base;
     if let Some(tolerance) = request.tolerance {
         check_tolerance(tolerance).map_err(RelaxError::from)?;
-    }
-    if base.scenario().wind.is_some() {
-        return Err(RelaxError::from(UnmodelledFeature::Wind { what: "a fit" }).into());
     }
     request.data.check_columns()?;
     request.data.check_choices()?;

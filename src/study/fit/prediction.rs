@@ -7,9 +7,12 @@
 
 use crate::leaf::{LeafParameterDerivative, LinearResponse, ParameterForces};
 use crate::modes;
+use crate::modes::motion_pairs::MotionPair;
 use crate::motion::Physics;
 use crate::relax::accuracy::transfer::weights;
-use crate::relax::{ContinuationFailure, GridLevel, Linearized, NestedEquilibrium, Stencil};
+use crate::relax::{
+    ContinuationFailure, GridLevel, Linearized, NestedEquilibrium, Stencil, small_motion_pairs,
+};
 use crate::scenario::{Photo, PhotoParameterDerivative};
 use crate::study::fit::columns::{
     COORDINATE_COLUMNS, DatumDimension, FIRST_PHOTO_COORDINATE, MeasuredQuantity,
@@ -23,13 +26,97 @@ use std::sync::{Mutex, PoisonError};
 /// A leaf at rest at some values of the free numbers.
 pub(super) struct CaseSolution {
     pub equilibrium: NestedEquilibrium,
-    /// Modes on the first grids.
-    pub modes: Vec<Vec<modes::Eigenpair>>,
+    pub vibrations: Vibrations,
     pub scalar_data: Vec<ScalarDatum>,
     /// Its response to the numbers, once computed.
     pub responses: Option<ParameterResponses>,
     /// The gradients of the components; empty until computed.
     pub gradients: Vec<Vec<f64>>,
+}
+
+/// What vibrates of a leaf, on its first grids.
+pub(super) enum Vibrations {
+    /// Its modes.
+    Modes(Vec<Vec<modes::Eigenpair>>),
+    /// Its small motions, where loads have no potential.
+    Motions(Vec<Vec<MotionPair>>),
+}
+
+impl Vibrations {
+    /// The number of grids.
+    fn grids(&self) -> usize {
+        match self {
+            Vibrations::Modes(modes) => modes.len(),
+            Vibrations::Motions(motions) => motions.len(),
+        }
+    }
+
+    /// Whether a mode has a frequency with derivatives on all grids.
+    fn check_frequency(&self, mode: usize) -> Result<(), ContinuationFailure> {
+        let Vibrations::Motions(grids) = self else {
+            return Ok(());
+        };
+        let motions = || grids.iter().map(|motions| &motions[mode - 1]);
+        let why = if motions().any(|it| it.root.im == 0.0) {
+            format!("small motion {mode} does not oscillate: leave out frequency_{mode}")
+        } else if motions().any(|it| it.separation < LEAST_SEPARATION) {
+            format!(
+                "small motion {mode} is about to merge with another one, or has its frequency, and no derivatives: \
+                 leave out frequency_{mode}"
+            )
+        } else {
+            return Ok(());
+        };
+        Err(ContinuationFailure::NotAtRest(why))
+    }
+}
+
+/// How far from merging with another one a small motion is differentiated: about two hundredths of the load below
+/// flutter without damping, which grids of some ten segments locate less well.
+const LEAST_SEPARATION: f64 = 0.2;
+
+/// The grids on which a leaf vibrates.
+fn vibrating_grids(at: &NestedEquilibrium) -> impl Iterator<Item = &GridLevel> {
+    let levels = at.levels.iter().enumerate();
+    let small = |(k, level): &(usize, &GridLevel)| {
+        *k == 0 || 6 * level.leaf.rods() * level.leaf.segments() < MOST_UNKNOWNS_FOR_MODES
+    };
+    levels.take_while(small).map(|(_, level)| level)
+}
+
+fn lost_frequencies() -> ContinuationFailure {
+    ContinuationFailure::NotAtRest("its frequencies cannot be found".into())
+}
+
+/// So many modes on each of these grids; none if none are asked for.
+fn modes_on_grids(
+    at: &NestedEquilibrium,
+    count: usize,
+) -> Result<Vec<Vec<modes::Eigenpair>>, ContinuationFailure> {
+    let on = |level: &GridLevel| {
+        let pairs = modes::unsoftened_modes(&level.leaf, &level.state, count);
+        let pairs = pairs.filter(|pairs| pairs.len() == count);
+        pairs.ok_or_else(lost_frequencies)
+    };
+    match count {
+        0 => Ok(Vec::new()),
+        _ => vibrating_grids(at).map(on).collect(),
+    }
+}
+
+/// So many small motions on each of these grids; none if none are asked for.
+fn motions_on_grids(
+    at: &NestedEquilibrium,
+    count: usize,
+) -> Result<Vec<Vec<MotionPair>>, ContinuationFailure> {
+    let on = |level: &GridLevel| {
+        let pairs = small_motion_pairs(level, count).filter(|pairs| pairs.len() == count);
+        pairs.ok_or_else(lost_frequencies)
+    };
+    match count {
+        0 => Ok(Vec::new()),
+        _ => vibrating_grids(at).map(on).collect(),
+    }
 }
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
@@ -48,27 +135,18 @@ impl CaseSolution {
                 _ => None,
             });
         let count = frequencies.max().unwrap_or(0);
-        if count > 0 && at.levels.iter().any(|it| !it.leaf.leaf.has_potential()) {
-            return Err(ContinuationFailure::NotAtRest(
-                "its loads have no potential, without which it has no modes: leave out the frequencies".into(),
-            ));
-        }
-        let mut modes = Vec::new();
-        for level in at.levels.iter().filter(|_| count > 0) {
-            let unknowns = 6 * level.leaf.rods() * level.leaf.segments();
-            if modes.is_empty() || unknowns < MOST_UNKNOWNS_FOR_MODES {
-                let pairs = modes::unsoftened_modes(&level.leaf, &level.state, count);
-                let lost =
-                    || ContinuationFailure::NotAtRest("its frequencies cannot be found".into());
-                let pairs = pairs
-                    .filter(|pairs| pairs.len() == count)
-                    .ok_or_else(lost)?;
-                modes.push(pairs);
+        let vibrations = match at.levels.iter().all(|it| it.leaf.leaf.has_potential()) {
+            true => Vibrations::Modes(modes_on_grids(&at, count)?),
+            false => Vibrations::Motions(motions_on_grids(&at, count)?),
+        };
+        for measured in of.measured_values() {
+            if let MeasuredQuantity::Frequency(mode) = measured.quantity {
+                vibrations.check_frequency(mode)?;
             }
         }
         let mut found = CaseSolution {
             equilibrium: at,
-            modes,
+            vibrations,
             scalar_data: Vec::new(),
             responses: None,
             gradients: Vec::new(),
@@ -198,24 +276,29 @@ impl CaseSolution {
                 self.equilibrium.extrapolated_value(force)[axis] * self.force_unit()
             }
             MeasuredQuantity::Frequency(mode) => {
-                self.extrapolated_eigenvalue(mode).max(0.0).sqrt()
-                    * self.data_unit(DatumDimension::Frequency)
+                let frequency = match &self.vibrations {
+                    Vibrations::Modes(modes) => {
+                        let eigenvalue =
+                            self.extrapolate_over_grids(|level| modes[level][mode - 1].eigenvalue);
+                        eigenvalue.max(0.0).sqrt()
+                    }
+                    Vibrations::Motions(motions) => {
+                        self.extrapolate_over_grids(|level| motions[level][mode - 1].root.im)
+                    }
+                };
+                frequency * self.data_unit(DatumDimension::Frequency)
             }
         }
     }
 
-    /// An eigenvalue, extrapolated over the grids with modes.
-    fn extrapolated_eigenvalue(&self, mode: usize) -> f64 {
-        self.extrapolate_over_grids(|level| self.modes[level][mode - 1].eigenvalue)
-    }
-
+    /// A number of the modes, extrapolated over the grids with modes.
     pub fn extrapolate_over_grids(&self, value: impl Fn(usize) -> f64) -> f64 {
         let segments = self
             .equilibrium
             .levels
             .iter()
             .map(|level| level.leaf.segments());
-        let segments: Vec<usize> = segments.take(self.modes.len()).collect();
+        let segments: Vec<usize> = segments.take(self.vibrations.grids()).collect();
         let weights = weights(&segments, f64::INFINITY);
         weights
             .iter()
