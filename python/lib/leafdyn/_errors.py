@@ -81,8 +81,8 @@ class Interrupted(KeyboardInterrupt):
     partial: Any
     """What the function would have returned, as far as it came: the leaf with the outcome ``"out-of-time"``; of many
     leaves the list with none in place of those that were not finished; of a sweep and a map the finished rows; of a
-    trace and a boundary what was followed until then; of a fit the best values; of a motion the
-    outputs so far. None where nothing was found."""
+    trace and a boundary what was verified until then; of a fit the best values; of a motion the outputs so far. None
+    where nothing was found."""
 
     def __init__(self, partial: Any) -> None:
         super().__init__(
