@@ -35,6 +35,8 @@ done
 
 # PyElastica and exudyn.
 cargo build --release
+# Every verb on every scenario.
+python benches/verbs.py target/release/leafdyn
 # Needs valgrind, perf and objdump besides.
 python benches/roofline.py target/release/leafdyn scenarios/paper/fig04.toml --set leaf.rods=35
 export OMP_NUM_THREADS=1 NUMBA_NUM_THREADS=1

@@ -12,7 +12,7 @@ use pyo3::prelude::*;
 
 use crate::errors::{value_error, vary_error};
 use crate::result::Files;
-use crate::run::run;
+use crate::run::{Interrupt, run_keeping};
 use crate::scenario::Scenario;
 
 /// A table of measurements.
@@ -45,7 +45,7 @@ fn fit_error(py: Python, error: FitError) -> PyErr {
     }
 }
 
-/// Fits free numbers of a scenario to measurements.
+/// Fits free numbers of a scenario to measurements; after Ctrl-C the best that was found until then.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are those of the verb")]
 pub fn fit(
@@ -100,7 +100,8 @@ pub fn fit(
         limit: Default::default(),
         most_evaluations: None,
     };
-    let found = run(py, progress, move |monitor| {
+    let mut interrupt = Interrupt::default();
+    let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
         request.limit = monitor.limit();
         study::fit(&request, &mut |now| {
             let FitStep {
@@ -109,11 +110,11 @@ pub fn fit(
             if budget.is_some() {
                 return;
             }
-            monitor.report_or_end(step as f64, None, || {
+            monitor.report(step as f64, None, || {
                 format!("step {step}, sum of squares {sum:.6e}")
             });
         })
     })?;
-    let fit = found.map_err(|error| fit_error(py, error))?;
-    Ok(Files::of(fit, scenario.checked.clone()))
+    let fit = interrupt.or_else(found, |error| fit_error(py, error))?;
+    interrupt.hand_over(py, Files::of(fit, scenario.checked.clone()))
 }

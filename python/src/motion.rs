@@ -19,7 +19,7 @@ use pyo3::types::PyDict;
 use crate::arrays::{Array, array, flat};
 use crate::errors::value_error;
 use crate::result::{Files, chosen, write_error};
-use crate::run::{elapsed, on_pool, run};
+use crate::run::{Interrupt, elapsed, on_pool, run, run_keeping};
 use crate::scenario::Scenario;
 
 /// Shapes that a film strip shows.
@@ -113,12 +113,15 @@ impl Motion {
     }
 
     /// Follows the leaf from time 0 to the end, or as far as it goes, on grids that are refined as
-    /// requested, and keeps all outputs of the last.
-    fn follow(&self, py: Python, progress: Option<&Bound<PyAny>>) -> PyResult<()> {
+    /// requested, and keeps all outputs of the last, whose number is returned. After Ctrl-C those are kept of
+    /// the last run that came to its end, or of the first as far as it came.
+    fn follow(&self, py: Python, progress: Option<&Bound<PyAny>>) -> PyResult<usize> {
         let state = self.state.clone();
-        let (scenario, options) = (self.scenario.clone(), self.options.clone());
+        let (scenario, mut options) = (self.scenario.clone(), self.options.clone());
         let duration = scenario.dynamics.duration;
-        let followed = run(py, progress, move |monitor| {
+        let mut interrupt = Interrupt::default();
+        let followed = run_keeping(py, progress, &mut interrupt, move |monitor| {
+            options.limit = monitor.limit();
             let mut motion = Refinement::new(&scenario, &options)?;
             let clock = Instant::now();
             let mut watch = |simulation: &Simulation| {
@@ -129,17 +132,21 @@ impl Motion {
                 });
                 !monitor.cancelled()
             };
+            let mut runs = 0;
             while let Some(mut simulation) = motion.next_run(&mut watch) {
                 let (mut frames, mut stopped) = (vec![simulation.frame()], None);
-                while !simulation.done() && stopped.is_none() && watch(&simulation) {
+                while !simulation.done() && stopped.is_none() {
                     match simulation.next_frame() {
                         Ok(frame) => frames.push(frame),
                         Err(why) => stopped = Some(why),
                     }
+                    watch(&simulation);
                 }
-                if monitor.cancelled() {
+                if monitor.cancelled() && (runs > 0 || frames.len() == 1) {
+                    // A run on a coarser grid is whole.
                     break;
                 }
+                runs += 1;
                 motion.end_run(&mut simulation, stopped);
                 *state.lock().unwrap_or_else(PoisonError::into_inner) = State {
                     simulation,
@@ -149,7 +156,9 @@ impl Motion {
             }
             Ok::<(), SimulationError>(())
         })?;
-        followed.map_err(value_error)
+        interrupt.or_else(followed, value_error)?;
+        let outputs = self.state().frames.len();
+        interrupt.hand_over(py, outputs)
     }
 
     /// The bar on the tips, until when it is known, and what was aimed at.

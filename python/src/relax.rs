@@ -1,7 +1,7 @@
 //! Relaxation of leaves.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use leafdyn::relax::{
@@ -19,7 +19,9 @@ use rayon::prelude::*;
 use crate::errors::{value_error, vary_error};
 use crate::posture::Points;
 use crate::result::Leaf;
-use crate::run::{Monitor, elapsed, run, run_here};
+use crate::run::{
+    Interrupt, Monitor, elapsed, interrupted, is_interrupt, run, run_here, run_keeping,
+};
 use crate::scenario::Scenario;
 use crate::start::Start;
 
@@ -171,6 +173,7 @@ fn solve_here(
     asked: &Asked,
     options: &Options,
     progress: Option<&Bound<PyAny>>,
+    interrupt: &mut Interrupt,
 ) -> PyResult<Option<Result<Equilibrium, RelaxError>>> {
     let rods = scenario.rods.len();
     let few = |segments: usize| rods.saturating_mul(segments) <= FEW_NODES;
@@ -179,14 +182,15 @@ fn solve_here(
         return Ok(None);
     }
     let mut options = options.clone();
-    let found = run_here(py, progress, |monitor, step| {
+    let found = run_here(py, progress, interrupt, |monitor, step| {
         monitor.watch(&mut options.limit);
         let mut large = false;
         let mut report = reporter(monitor, &scenario.name);
         let found = relax::relax(scenario, &options, &mut |progress| {
             report(progress);
             step(monitor);
-            if matches!(progress, Progress::Relaxing { grid, .. } if !few(*grid)) {
+            let is_large = matches!(progress, Progress::Relaxing { grid, .. } if !few(*grid));
+            if is_large && !monitor.cancelled() {
                 // It restarts on the pool, which costs little compared with the remaining steps.
                 large = true;
                 monitor.cancel();
@@ -197,7 +201,7 @@ fn solve_here(
     Ok(found.flatten())
 }
 
-/// Lets a leaf come to rest.
+/// Lets a leaf come to rest; after Ctrl-C as far as it came.
 #[pyfunction]
 #[pyo3(name = "relax")]
 pub fn relax_one(
@@ -207,37 +211,36 @@ pub fn relax_one(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Leaf> {
     let mut options = asked.options()?;
+    let mut interrupt = Interrupt::default();
     if let Some(tolerance) = asked.veins {
         let base = scenario.base(py)?;
-        let refined = run(py, progress, move |monitor| {
+        let refined = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
             study::refine_veins(&base, tolerance, &options, &mut reporter(monitor, &name))
         })?;
-        let RefinedBlade { base, leaf } = refined.map_err(|error| match error {
+        let refined = interrupt.or_else(refined, |error| match error {
             VeinsError::Vary(error) => vary_error(py, error),
             error => value_error(error),
-        })?;
-        return Ok(Leaf::new(
-            leaf,
-            base.scenario().clone().into(),
-            asked.stations,
-        ));
+        });
+        let RefinedBlade { base, leaf } = refined?;
+        let input = base.scenario().clone().into();
+        return interrupt.hand_over(py, Leaf::new(leaf, input, asked.stations));
     }
     let input = scenario.checked.clone();
     let estimate = asked.veins_error && input.blade.is_some();
     let estimate = (estimate.then(|| scenario.base(py)).transpose()?).zip(Some(options.clone()));
     let found = if let Some(points) = &asked.points {
         let (scenario, points) = (input.clone(), points.read(&input)?.points);
-        let found = run(py, progress, move |monitor| {
+        let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let mut report = reporter(monitor, &scenario.name);
             study::relax_from_points(&scenario, &points, &options, &mut report)
         })?;
-        found.map_err(value_error)?
+        interrupt.or_else(found, value_error)?
     } else if let Some(start) = &asked.start {
         let (scenario, stations, rods) = (input.clone(), start.stations.clone(), start.rods());
-        let found = run(py, progress, move |monitor| {
+        let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let from: (&[f64], &[RodShape]) = (&stations, &rods);
             relax::relax_from(
@@ -247,10 +250,10 @@ pub fn relax_one(
                 &mut reporter(monitor, &scenario.name),
             )
         })?;
-        found.map_err(value_error)?
+        interrupt.or_else(found, value_error)?
     } else if asked.margin {
         let scenario = input.clone();
-        let found = run(py, progress, move |monitor| {
+        let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let mut report = reporter(monitor, &scenario.name);
             let mut report_margin = |progress: &MarginProgress| match progress {
@@ -263,59 +266,59 @@ pub fn relax_one(
             };
             study::relax_with_margin(&scenario, &options, &mut report_margin)
         })?;
-        found.map_err(value_error)?
+        interrupt.or_else(found, value_error)?
     } else if asked.sensitivity.is_empty() && input.blade.is_some() {
         let base = scenario.base(py)?;
-        let found = run(py, progress, move |monitor| {
+        let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
             study::relax_blade(&base, &options, &mut reporter(monitor, &name))
         })?;
-        found.map_err(value_error)?
+        interrupt.or_else(found, value_error)?
     } else if asked.sensitivity.is_empty() {
-        if let Some(found) = solve_here(py, &input, &asked, &options, progress)? {
-            return Ok(Leaf::new(
-                found.map_err(value_error)?,
-                input,
-                asked.stations,
-            ));
+        if let Some(found) = solve_here(py, &input, &asked, &options, progress, &mut interrupt)? {
+            let found = interrupt.or_else(found, value_error)?;
+            return interrupt.hand_over(py, Leaf::new(found, input, asked.stations));
         }
         let scenario = input.clone();
-        let found = run(py, progress, move |monitor| {
+        let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             relax::relax(&scenario, &options, &mut reporter(monitor, &scenario.name))
         })?;
-        found.map_err(value_error)?
+        interrupt.or_else(found, value_error)?
     } else {
         let keys: Result<Vec<ParameterKeys>, _> = (asked.sensitivity.iter())
             .map(|key| ParameterKeys::parse_with_vectors(key))
             .collect();
         let keys = keys.map_err(|error| vary_error(py, error))?;
         let base = scenario.base(py)?;
-        let found = run(py, progress, move |monitor| {
+        let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
             study::relax_with_sensitivities(&base, &keys, &options, &mut reporter(monitor, &name))
         })?;
-        found.map_err(|error| match error {
+        interrupt.or_else(found, |error| match error {
             SensitivityError::Vary(error) => vary_error(py, error),
             error => value_error(error),
         })?
     };
-    let found = match estimate {
+    let found = match estimate.filter(|_| !interrupt.happened()) {
         None => found,
-        Some((base, mut options)) => run(py, progress, move |monitor| {
+        Some((base, mut options)) => run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let mut found = found;
             study::estimate_error_in_veins(&base, &mut found, &options);
             found
         })?,
     };
-    Ok(Leaf::new(found, input, asked.stations))
+    interrupt.hand_over(py, Leaf::new(found, input, asked.stations))
 }
 
+/// What became of a scenario: a leaf, or why it is refused.
+type LeafOrWhy = Result<Equilibrium, String>;
+
 /// Lets many leaves come to rest, side by side. The first that is refused ends the run, unless refusals are
-/// to be told in place of leaves.
+/// to be told in place of leaves. After Ctrl-C there is none where a leaf was not finished.
 #[pyfunction]
 pub fn relax_many(
     py: Python,
@@ -334,7 +337,10 @@ pub fn relax_many(
         estimate.then(|| scenario.base(py)).transpose()
     };
     let bases = scenarios.iter().map(base).collect::<PyResult<Vec<_>>>()?;
-    let found = run(py, progress, move |monitor| {
+    let finished: Arc<Vec<Mutex<Option<LeafOrWhy>>>> =
+        Arc::new(checked.iter().map(|_| Mutex::default()).collect());
+    let places = finished.clone();
+    let ended = run(py, progress, move |monitor| {
         monitor.watch(&mut options.limit);
         let (done, all, clock) = (AtomicUsize::new(0), checked.len(), Instant::now());
         let one = |(number, scenario): (usize, &Arc<scenario::Scenario>)| {
@@ -342,30 +348,52 @@ pub fn relax_many(
             if let (Ok(leaf), Some(base)) = (&mut found, &bases[number]) {
                 study::estimate_error_in_veins(base, leaf, &options);
             }
+            if monitor.cancelled() && found.as_ref().is_ok_and(|leaf| !leaf.outcome.is_at_rest()) {
+                // Stopped on its way.
+                return Ok(());
+            }
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             monitor.report(done as f64, Some(all as f64), || {
                 format!("{done} of {all} leaves, {}", elapsed(clock))
             });
-            match found {
+            let found = match found {
                 Err(error) if !tell_refusals => {
-                    Err(format!("scenarios[{number}], {}: {error}", scenario.name))
+                    return Err(format!("scenarios[{number}], {}: {error}", scenario.name));
                 }
-                found => Ok(found.map_err(|error| error.to_string())),
-            }
+                found => found.map_err(|error| error.to_string()),
+            };
+            *places[number]
+                .lock()
+                .unwrap_or_else(PoisonError::into_inner) = Some(found);
+            Ok(())
         };
         // One by one: a leaf may take a thousand times as long as the next.
-        let leaves = checked.par_iter().enumerate().with_max_len(1).map(one);
-        leaves.collect::<Result<Vec<Result<Equilibrium, String>>, String>>()
-    })?;
-    let leaves = found.or_else(refuse)?.into_iter().zip(inputs);
-    let leaf = |(found, input)| match found {
-        Ok(found) => {
+        let leaves = checked.par_iter().enumerate().with_max_len(1);
+        leaves.try_for_each(one)
+    });
+    let leaf = |(place, input): (&Mutex<Option<LeafOrWhy>>, _)| match place
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .take()
+    {
+        Some(Ok(found)) => {
             let leaf = Leaf::new(found, input, asked.stations);
-            Py::new(py, leaf).map(LeafOrRefusal::Leaf)
+            Py::new(py, leaf).map(|leaf| Some(LeafOrRefusal::Leaf(leaf)))
         }
-        Err(why) => Ok(LeafOrRefusal::Refusal(why)),
+        Some(Err(why)) => Ok(Some(LeafOrRefusal::Refusal(why))),
+        None => Ok(None),
     };
-    leaves.map(leaf).collect()
+    let leaves = || finished.iter().zip(inputs).map(leaf);
+    match ended {
+        Err(stop) if is_interrupt(py, &stop) => {
+            let leaves = leaves().collect::<PyResult<Vec<_>>>()?;
+            Err(interrupted(py, stop, leaves))
+        }
+        ended => {
+            ended?.or_else(refuse)?;
+            leaves().filter_map(Result::transpose).collect()
+        }
+    }
 }
 
 /// The shortest of so many times in which the library alone lets the leaf of a scenario come to rest,

@@ -7,19 +7,25 @@ use std::any::Any;
 use std::cell::OnceCell;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::thread::{self, ThreadId};
 use std::time::{Duration, Instant};
 use std::{mem, process};
 
 use leafdyn::relax::Limit;
-use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::{PyKeyboardInterrupt, PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
+use pyo3::sync::PyOnceLock;
+use pyo3::types::PyType;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
 /// Interval between checks for signals and progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
+
+/// How long a run that Ctrl-C ends may take to hand over what it has found.
+const PATIENCE: Duration = Duration::from_millis(120);
 
 /// Most threads that can be requested.
 const MOST_THREADS: usize = 1024;
@@ -151,6 +157,56 @@ impl Monitor {
     }
 }
 
+/// The Ctrl-C that ended a run whose partial result is kept, if one did.
+#[derive(Default)]
+pub struct Interrupt(Option<PyErr>);
+
+impl Interrupt {
+    /// Whether there was one.
+    pub fn happened(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// A result, or `leafdyn.Interrupted` with it where Ctrl-C ended the run.
+    pub fn hand_over<'py, R: IntoPyObject<'py>>(self, py: Python<'py>, result: R) -> PyResult<R> {
+        match self.0 {
+            None => Ok(result),
+            Some(stop) => Err(interrupted(py, stop, result)),
+        }
+    }
+
+    /// The value of a run, or why it has none: Ctrl-C, where that ended it.
+    pub fn or_else<T, E>(
+        &mut self,
+        found: Result<T, E>,
+        error: impl FnOnce(E) -> PyErr,
+    ) -> PyResult<T> {
+        found.map_err(|why| self.0.take().unwrap_or_else(|| error(why)))
+    }
+}
+
+/// Whether an exception is a Ctrl-C, and not one of the listener to the progress.
+pub fn is_interrupt(py: Python, stop: &PyErr) -> bool {
+    stop.is_instance_of::<PyKeyboardInterrupt>(py)
+}
+
+/// `leafdyn.Interrupted`, with what was found until then.
+pub fn interrupted<'py>(py: Python<'py>, stop: PyErr, partial: impl IntoPyObject<'py>) -> PyErr {
+    let Ok(partial) = partial.into_bound_py_any(py) else {
+        return stop;
+    };
+    let class = match INTERRUPTED.import(py, "leafdyn._errors", "Interrupted") {
+        Ok(class) => class,
+        Err(error) => return error,
+    };
+    match class.call1((partial,)) {
+        Ok(exception) => PyErr::from_value(exception),
+        Err(error) => error,
+    }
+}
+
+static INTERRUPTED: PyOnceLock<Py<PyType>> = PyOnceLock::new();
+
 /// The thread that loaded the package.
 static FIRST: OnceLock<ThreadId> = OnceLock::new();
 
@@ -189,10 +245,11 @@ pub type Step<'a> = &'a mut dyn FnMut(&Monitor);
 
 /// Does `work` on this thread, if it may: work that calls its `Step` often, several times in
 /// [`POLL_INTERVAL`], and ends when its monitor is cancelled. Ctrl-C, and an exception of `progress`,
-/// cancel it.
+/// cancel it; what it has found is kept after Ctrl-C, which `interrupt` then has.
 pub fn run_here<T: Send>(
     py: Python,
     progress: Option<&Bound<PyAny>>,
+    interrupt: &mut Interrupt,
     work: impl FnOnce(&Monitor, Step) -> T + Send,
 ) -> PyResult<Option<T>> {
     if !may_compute() {
@@ -222,9 +279,13 @@ pub fn run_here<T: Send>(
         let found = catch_unwind(AssertUnwindSafe(|| work(&monitor, &mut step)));
         (found.map_err(|panic| panicked(&*panic)), stop)
     });
-    match stop {
-        Some(stop) => Err(stop),
-        None => {
+    match (stop, found) {
+        (Some(stop), Ok(found)) if is_interrupt(py, &stop) => {
+            interrupt.0 = Some(stop);
+            Ok(Some(found))
+        }
+        (Some(stop), _) => Err(stop),
+        (None, found) => {
             monitor.forward(progress)?;
             found.map(Some)
         }
@@ -237,6 +298,53 @@ pub fn run<T: Send + 'static>(
     progress: Option<&Bound<PyAny>>,
     work: impl FnOnce(&Monitor) -> T + Send + 'static,
 ) -> PyResult<T> {
+    match wait_for(py, progress, work)? {
+        Waited::Ended(found) => Ok(found),
+        // It ends soon by itself. Freeing its memory may take long and is not waited for.
+        Waited::Stopped(stop, _) => Err(stop),
+    }
+}
+
+/// Does `work` on the pool, which ends with what it has found when its monitor is cancelled. That is kept
+/// after Ctrl-C, which `interrupt` then has, if it comes within [`PATIENCE`].
+pub fn run_keeping<T: Send + 'static>(
+    py: Python,
+    progress: Option<&Bound<PyAny>>,
+    interrupt: &mut Interrupt,
+    work: impl FnOnce(&Monitor) -> T + Send + 'static,
+) -> PyResult<T> {
+    let (stop, result) = match wait_for(py, progress, work)? {
+        Waited::Ended(found) => return Ok(found),
+        Waited::Stopped(stop, result) => (stop, result),
+    };
+    if !is_interrupt(py, &stop) {
+        return Err(stop);
+    }
+    match py.detach(move || result.recv_timeout(PATIENCE)) {
+        Ok(Ok(found)) => {
+            interrupt.0 = Some(stop);
+            Ok(found)
+        }
+        _ => Err(stop),
+    }
+}
+
+/// What a run sends: its result, or its panic.
+type Sent<T> = Receiver<thread::Result<T>>;
+
+/// A run that was waited for.
+enum Waited<T> {
+    Ended(T),
+    /// Why it was cancelled, and where it still may send its result.
+    Stopped(PyErr, Sent<T>),
+}
+
+/// Does `work` on the pool and waits until it ends or is cancelled.
+fn wait_for<T: Send + 'static>(
+    py: Python,
+    progress: Option<&Bound<PyAny>>,
+    work: impl FnOnce(&Monitor) -> T + Send + 'static,
+) -> PyResult<Waited<T>> {
     let monitor = Arc::new(Monitor {
         has_listener: progress.is_some(),
         ..Monitor::default()
@@ -245,7 +353,7 @@ pub fn run<T: Send + 'static>(
     let seen = monitor.clone();
     pool(None)?.spawn(move || {
         let found = catch_unwind(AssertUnwindSafe(|| work(&seen)));
-        // After Ctrl-C nothing waits for it.
+        // After Ctrl-C nothing may wait for it.
         let _ = done.send(found);
     });
     loop {
@@ -254,16 +362,15 @@ pub fn run<T: Send + 'static>(
         match received {
             Ok(Ok(found)) => {
                 monitor.forward(progress)?;
-                return Ok(found);
+                return Ok(Waited::Ended(found));
             }
             Ok(Err(panic)) => return Err(panicked(&*panic)),
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return Err(panicked(&"a thread ended")),
         }
         if let Err(stop) = py.check_signals().and_then(|()| monitor.forward(progress)) {
-            // It ends soon by itself. Freeing its memory may take long and is not waited for.
             monitor.cancel();
-            return Err(stop);
+            return Ok(Waited::Stopped(stop, result));
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Studies of leaves at rest, and the program itself.
 
 use std::ffi::OsString;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
 use leafdyn::relax::{Limit, SemiImplicit};
@@ -17,7 +18,7 @@ use crate::errors::{value_error, vary_error};
 use crate::range::Range;
 use crate::relax::{check_stations, refuse, reporter};
 use crate::result::{Files, Leaf};
-use crate::run::{elapsed, on_pool, run};
+use crate::run::{Interrupt, elapsed, interrupted, is_interrupt, on_pool, run, run_keeping};
 use crate::scenario::Scenario;
 
 /// A check: its files, the relaxed leaf, and the stations and positions of the boundary-value
@@ -73,9 +74,10 @@ pub fn equilibria(
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Equilibria> {
     check_stations(stations)?;
+    let mut interrupt = Interrupt::default();
     let scenario = scenario.checked.clone();
     let input = scenario.clone();
-    let found = run(py, progress, move |monitor| {
+    let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
         let how = SemiImplicit {
             full_model,
             ..SemiImplicit::default()
@@ -87,7 +89,7 @@ pub fn equilibria(
         };
         study::equilibria(&scenario, how, tolerance, &monitor.limit(), &mut report)
     })?;
-    let mut all = found.map_err(value_error)?;
+    let mut all = interrupt.or_else(found, value_error)?;
     for one in &mut all.found {
         one.equilibrium = one.equilibrium.clone().at_stations(&input, stations);
     }
@@ -96,7 +98,8 @@ pub fn equilibria(
         (leaf, one.starts, one.plain)
     });
     let leaves = leaves.collect();
-    Ok((Files::of(all, input), leaves))
+    let found: Equilibria = (Files::of(all, input), leaves);
+    interrupt.hand_over(py, found)
 }
 
 /// A trace, or a boundary: its files, whether it is complete, its remark, and the centerlines of the
@@ -140,7 +143,7 @@ fn trace_error(py: Python, error: TraceError) -> PyErr {
     }
 }
 
-/// Follows an equilibrium through a number of its scenario.
+/// Follows an equilibrium through a number of its scenario; after Ctrl-C as far as it came.
 #[pyfunction]
 pub fn trace<'py>(
     py: Python<'py>,
@@ -149,16 +152,18 @@ pub fn trace<'py>(
     asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Traced<'py>> {
-    let request = asked.request(py, scenario, &vary)?;
-    let found = run(py, progress, move |monitor| {
+    let mut request = asked.request(py, scenario, &vary)?;
+    let mut interrupt = Interrupt::default();
+    let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
+        request.limit = monitor.limit();
         let mut report = |branch: usize, points: usize, value: f64| {
-            monitor.report_or_end(points as f64, None, || {
+            monitor.report(points as f64, None, || {
                 format!("branch {}, {points} points, at {value:.6}", branch + 1)
             });
         };
         study::trace(&request, &mut report)
     })?;
-    let trace = found.map_err(|error| trace_error(py, error))?;
+    let trace = interrupt.or_else(found, |error| trace_error(py, error))?;
     let branches = trace.branches.iter();
     let lines: PyResult<Vec<Vec<_>>> = branches
         .map(|branch| {
@@ -169,7 +174,7 @@ pub fn trace<'py>(
     let remark = trace.remark.as_ref().map(ToString::to_string);
     let complete = trace.complete;
     let files = Files::of(trace, scenario.checked.clone());
-    Ok((files, complete, remark, lines?))
+    interrupt.hand_over(py, (files, complete, remark, lines?))
 }
 
 /// Follows the points at which the index of a leaf changes through two numbers of its scenario.
@@ -182,21 +187,23 @@ pub fn boundary<'py>(
     asked: Asked,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Traced<'py>> {
-    let request = BoundaryRequest {
+    let mut interrupt = Interrupt::default();
+    let mut request = BoundaryRequest {
         map: None,
         trace: asked.request(py, scenario, &along)?,
         across: across.vary(py)?,
     };
-    let found = run(py, progress, move |monitor| {
+    let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
+        request.trace.limit = monitor.limit();
         let mut report = |curve: Option<usize>, points: usize, [first, second]: [f64; 2]| {
-            monitor.report_or_end(points as f64, None, || {
+            monitor.report(points as f64, None, || {
                 let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));
                 format!("{what}, {points} points, at {first:.6}, {second:.6}")
             });
         };
         study::trace_stability_boundary(&request, &mut report)
     })?;
-    let boundary = found.map_err(|error| trace_error(py, error))?;
+    let boundary = interrupt.or_else(found, |error| trace_error(py, error))?;
     let lines: PyResult<Vec<Vec<_>>> = (boundary.curves.iter())
         .map(|curve| {
             let points = curve.points.iter();
@@ -206,10 +213,10 @@ pub fn boundary<'py>(
     let remark = boundary.remark.as_ref().map(ToString::to_string);
     let complete = boundary.complete;
     let files = Files::of(boundary, scenario.checked.clone());
-    Ok((files, complete, remark, lines?))
+    interrupt.hand_over(py, (files, complete, remark, lines?))
 }
 
-/// Solves a leaf by several methods over one or two numbers.
+/// Solves a leaf by several methods over one or two numbers; after Ctrl-C the cells that were finished.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "they are those of the verb")]
 pub fn map(
@@ -238,11 +245,14 @@ pub fn map(
         cell_seconds.unwrap_or(DEFAULT_CELL_SECONDS),
     );
     let mut request = request.map_err(value_error)?;
-    let mut map = run(py, progress, move |monitor| {
+    let finished = Arc::new(Mutex::new(Vec::new()));
+    let (rows, asked) = (finished.clone(), request.clone());
+    let ended = run(py, progress, move |monitor| {
         request.limit = monitor.limit();
         let todo: Vec<usize> = (0..request.cells()).collect();
-        let (mut rows, mut done, clock) = (Vec::new(), 0, Instant::now());
+        let (mut done, clock) = (0, Instant::now());
         study::map(&request, &todo, &mut |new| {
+            let mut rows = rows.lock().unwrap_or_else(PoisonError::into_inner);
             rows.extend(new);
             done += 1;
             let cells = todo.len();
@@ -251,6 +261,8 @@ pub fn map(
             });
             !monitor.cancelled()
         });
+        // A copy, as Ctrl-C may still come.
+        let rows = rows.lock().unwrap_or_else(PoisonError::into_inner).clone();
         let mut map = Map::new(request, rows);
         if !monitor.cancelled() {
             map.find_jumps(&|done, pairs| {
@@ -260,9 +272,16 @@ pub fn map(
             });
         }
         map
-    })?;
-    map.show = show;
-    Ok(Files::of(map, scenario.checked.clone()))
+    });
+    let files = |map: Map| Files::of(Map { show, ..map }, scenario.checked.clone());
+    match ended {
+        Err(stop) if is_interrupt(py, &stop) => {
+            let rows =
+                std::mem::take(&mut *finished.lock().unwrap_or_else(PoisonError::into_inner));
+            Err(interrupted(py, stop, files(Map::new(asked, rows))))
+        }
+        ended => ended.map(files),
+    }
 }
 
 /// A chart: its files, those of the cost against the number of veins if that was asked for, whether

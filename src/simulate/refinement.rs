@@ -106,6 +106,8 @@ pub struct Refinement {
     /// Number of runs that have ended, and whether the next is the last in any case.
     runs: usize,
     last: bool,
+    /// Why there is no run with which the first is compared, if there is none.
+    not_compared: Option<String>,
     /// Whether the run before was followed to its end, and until when its error is known.
     completed: bool,
     known_until: Option<f64>,
@@ -139,6 +141,7 @@ impl Refinement {
             coarsest: None,
             runs: 0,
             last: false,
+            not_compared: None,
             completed: false,
             known_until: None,
             seconds: 0.0,
@@ -225,7 +228,9 @@ impl Refinement {
                     refined_within: self.refines().then_some(REFINEMENT_SECONDS),
                 },
                 (None, Some(from)) => MotionDoubt::RunsPart { from },
-                (None, None) => MotionDoubt::NotCompared,
+                (None, None) => MotionDoubt::NotCompared {
+                    why: self.not_compared.take(),
+                },
             };
             simulation.doubts.push(doubt);
         }
@@ -362,9 +367,13 @@ impl Refinement {
         if let Some(step) = self.options.step {
             // Given steps are taken on the other grid, too, and steps half as long there tell what
             // they cost.
-            let runs = [step, 0.5 * step].map(|step| self.build_run(with(Some(step))).ok());
-            let [Some(same), Some(halved)] = runs else {
-                return Some(None);
+            let runs = [step, 0.5 * step].map(|step| self.build_run(with(Some(step))));
+            let [same, halved] = match runs {
+                [Ok(same), Ok(halved)] => [same, halved],
+                [Err(why), _] | [_, Err(why)] => {
+                    self.not_compared = Some(why.to_string());
+                    return Some(None);
+                }
             };
             let same = self.run_unrecorded(same, watch)?;
             let halved = self.run_unrecorded(halved, watch)?;
@@ -373,8 +382,12 @@ impl Refinement {
             return Some(Some(comparison.with_half_steps(&halved)));
         }
         let longer = own.step.map(|step| factor * step);
-        let Ok(mut run) = self.build_with_steps(with(longer)) else {
-            return Some(None);
+        let mut run = match self.build_with_steps(with(longer)) {
+            Ok(run) => run,
+            Err(why) => {
+                self.not_compared = Some(why.to_string());
+                return Some(None);
+            }
         };
         if let (Some(step), Some(longer)) = (run.longest_step(), longer)
             && factor > 1.0

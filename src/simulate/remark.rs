@@ -65,8 +65,14 @@ remarks! {
             from: f64,
         } = "runs-part",
         /// Tips of unknown accuracy.
-        #[error("how accurate the tips are is not known: there is no second run to compare with")]
-        NotCompared = "not-compared",
+        #[error(
+            "how accurate the tips are is not known: there is no second run to compare with{}",
+            .why.as_ref().map_or(String::new(), |why| format!(" (on another grid: {why})"))
+        )]
+        NotCompared {
+            /// Why there is none, if it was tried.
+            why: Option<String>,
+        } = "not-compared",
     }
 }
 

@@ -1,9 +1,11 @@
 //! A fit has a budget that is told before its first step, and ends with the best that was found so far.
 
-use leafdyn::study::{FitOutcome, FitRemark, fit};
+use leafdyn::study::{FitError, FitOutcome, FitRemark, fit};
 use leafdyn_testing::fit::{LEAF, THREE, pulls, request};
 use leafdyn_testing::random::Draw;
 use leafdyn_testing::*;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Tips pulled to where no such leaf has them, so that there is much to search.
 fn hopeless() -> String {
@@ -47,4 +49,40 @@ fn a_budget_ends_at_the_same_place_on_all_threads() {
             .collect::<Vec<_>>()
     });
     assert_eq!(values[0], values[1]);
+}
+
+/// What a fit has found when its limit is reached is its result: values at which the sum of squares is no larger
+/// than where it began.
+#[test]
+fn a_limit_that_is_reached_leaves_the_best_values() {
+    for steps in [1, 2, 4] {
+        let cancel = Arc::new(AtomicBool::new(false));
+        let mut asked = request(base(LEAF, ""), &[&hopeless()], &THREE);
+        asked.limit.cancel = Some(cancel.clone());
+        let (mut sums, mut seen) = (Vec::new(), 0);
+        let found = fit(&asked, &mut |step| {
+            if step.budget.is_none() {
+                sums.push(step.sum);
+                seen += 1;
+                cancel.store(seen >= steps, Ordering::Relaxed);
+            }
+        });
+        let found = found.unwrap();
+        assert_eq!(found.remarks[0], FitRemark::Stopped);
+        assert_eq!(found.outcome, FitOutcome::NotConverged);
+        let squares = found.residuals.iter().map(|it| it.residual.powi(2));
+        let last: f64 = squares.sum();
+        let slack = 1.0 + 1e-3;
+        assert!(last <= slack * sums[0], "{last} {sums:?}");
+        assert!((last - found.chi_squared).abs() <= 1e-9 * last);
+    }
+}
+
+/// Where the limit is reached before any leaf is at rest there is nothing to tell.
+#[test]
+fn a_limit_that_is_reached_at_once_leaves_nothing() {
+    let mut asked = request(base(LEAF, ""), &[&hopeless()], &THREE);
+    asked.limit.cancel = Some(Arc::new(AtomicBool::new(true)));
+    let refused = fit(&asked, &mut |_| {});
+    assert!(matches!(refused, Err(FitError::NoEquilibrium(_))));
 }

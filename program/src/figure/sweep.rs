@@ -63,14 +63,21 @@ pub fn draw(sweep: &Sweep, scenario: &Scenario) -> Drawing {
     );
     let as_cells = is_drawn_as_cells(&request.axes);
     let (mut letters, mut below) = (panel_letters(), PAGE.header);
-    for (place, quantity) in sweep.shown().into_iter().enumerate() {
-        let letter = letters.next().unwrap_or_default();
+    let shown = sweep.shown();
+    // One panel needs no letter, and a curve alone no key.
+    let is_only = shown.len() == 1;
+    let key = match request.axes.len() {
+        1 => 0.0,
+        _ => LAYOUT.key,
+    };
+    for (place, quantity) in shown.into_iter().enumerate() {
+        let letter = letters.next().filter(|_| !is_only).unwrap_or_default();
         let height = match (as_cells, place) {
             (true, _) => LAYOUT.cells,
             (false, 0) => LAYOUT.diagram,
             (false, _) => LAYOUT.further,
         };
-        let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, LAYOUT.key);
+        let cell = PageRectangle::left_of_legend(below + PAGE.panel_title, height, key);
         let panel = SweepPanel {
             sweep,
             units,
@@ -309,11 +316,13 @@ mod tests {
             one.contains(">z of the tip<") && one.contains(">3 leaves<")
                 || one.contains("3 leaves")
         );
+        assert!(!one.contains(">(a)<"), "{one}");
         let two = svg(
             &["load.gravity[2]=-1..-3:3", "stiffness.bending_2=1..2:2"],
             &["tip_z", "frequency_1"],
         );
         assert!(two.contains("frequency 1"), "{two}");
+        assert!(two.contains(">(a)<") && two.contains(">(b)<"), "{two}");
         for text in ["= 1.0", "= 2.0"] {
             assert!(two.contains(text), "{text}");
         }

@@ -1,10 +1,9 @@
 //! `leafdyn fit`: fits numbers of a scenario to measurements.
 
-use crate::verbs::exit::{ExitStatus, Refusal, print_note};
+use crate::verbs::exit::{ExitStatus, InterruptedRun, Refusal, print_note};
 use crate::verbs::progress::{completed_fraction, format_duration};
 use crate::verbs::request::{DeliveredResult, ScenarioArguments, ScenarioJob, VerbTraits};
 use clap::{Args, ValueHint};
-use leafdyn::relax::Limit;
 use leafdyn::scenario::bytes;
 use leafdyn::study;
 use leafdyn::study::{
@@ -87,6 +86,7 @@ impl FitArguments {
         let reads: Vec<_> = self.data.iter().chain(&self.candidates).cloned().collect();
         let traits = VerbTraits {
             varies_numbers: true,
+            keeps_partial_result: true,
             input_files: &reads,
             ..VerbTraits::default()
         };
@@ -123,12 +123,12 @@ impl FitArguments {
             robust: self.robust,
             candidates,
             tolerance: self.request.tolerance,
-            limit: Limit::default(),
+            limit: job.limit.clone(),
             most_evaluations: self.most_evaluations,
         };
         let mut line = job.progress_line();
         let (mut profiling, mut most) = (false, String::new());
-        let fit = study::fit(&request, &mut |now| {
+        let found = study::fit(&request, &mut |now| {
             let FitStep {
                 step,
                 sum,
@@ -150,8 +150,14 @@ impl FitArguments {
             line.update(fraction, || {
                 format!("{intervals}step {step}, sum of squares {sum:.6e}{most}")
             });
-        })?;
+        });
         drop(line);
+        let fit = match found {
+            Err(_) if job.is_interrupted() => {
+                return Err(InterruptedRun("no values were found").into());
+            }
+            found => found?,
+        };
         job.print_remark(fit.remarks.first());
         job.write_and_deliver(&fit, fit.is_success())
     }

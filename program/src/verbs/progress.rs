@@ -40,7 +40,7 @@ impl ProgressLine {
         }
     }
 
-    /// Shows the progress of a solver that runs to this tolerance.
+    /// Shows the progress of a solver that runs to this tolerance. Steps are counted over all grids.
     pub fn update_solver(&mut self, progress: &Progress, tolerance: f64) {
         let fraction = match progress {
             &Progress::Relaxing {
@@ -59,7 +59,13 @@ impl ProgressLine {
                     .completed_fraction(now)
             }
         };
-        self.update(fraction, || progress.to_string());
+        let steps = self.grids.steps();
+        self.update(fraction, || match *progress {
+            Progress::Relaxing { grid, residual, .. } => {
+                format!("{steps} steps, now {grid} segments a vein, residual {residual:.1e}")
+            }
+            Progress::Shooting(_) => progress.to_string(),
+        });
     }
 
     /// Shows a message with the elapsed time and, if the completed fraction of the phase is
@@ -113,12 +119,24 @@ pub fn range_fraction(from: f64, at: f64, to: f64, log: bool) -> Option<f64> {
 struct GridProgress {
     /// The grids so far, the current one last.
     segments_so_far: Vec<usize>,
+    /// Steps on the grids before the current one.
+    steps_before: usize,
+    /// The step on the current grid, from 0.
+    step: usize,
+    /// The largest fraction of the work that was told.
+    farthest: f64,
 }
 
 impl GridProgress {
+    /// The steps on all grids so far.
+    fn steps(&self) -> usize {
+        self.steps_before + self.step + 1
+    }
+
     /// Estimates the completed fraction of the work: the first grid, on which the leaf
     /// moves, counts as six Newton steps there, every other grid as two. Every grid reduces
-    /// the error by about three digits.
+    /// the error by about three digits. The fraction never falls: where more grids are needed than
+    /// was thought, it is unknown until it is larger than what was told.
     fn completed_fraction(
         &mut self,
         grid: usize,
@@ -131,9 +149,17 @@ impl GridProgress {
         const DIGITS: f64 = 3.0;
         /// Digits by which the residual falls until the leaf is at rest.
         const REST_DIGITS: f64 = 12.0;
-        if self.segments_so_far.last() != Some(&grid) {
+        let other = self
+            .segments_so_far
+            .last()
+            .is_some_and(|last| *last != grid);
+        if other || step < self.step {
+            self.steps_before += self.step + 1;
+        }
+        if other || self.segments_so_far.is_empty() {
             self.segments_so_far.push(grid);
         }
+        self.step = step;
         let current = self.segments_so_far.len() - 1;
         let wanted = (-tolerance.log10() / DIGITS).ceil().clamp(0.0, 16.0) as usize;
         let last = current.max(wanted);
@@ -151,7 +177,10 @@ impl GridProgress {
         };
         let before: f64 = (0..current).map(work).sum();
         let all: f64 = (0..=last).map(work).sum();
-        Some((before + here * work(current)) / all)
+        let fraction = (before + here * work(current)) / all;
+        let known = fraction >= self.farthest;
+        self.farthest = fraction.max(self.farthest);
+        known.then_some(fraction)
     }
 }
 
@@ -276,7 +305,10 @@ mod tests {
         ];
         assert!(parts.windows(2).all(|pair| pair[0] < pair[1]), "{parts:?}");
         assert_eq!((parts[0], parts[5]), (0.0, 1.0));
+        assert_eq!(grids.steps(), 10 + 2 + 3);
         // One more grid than was thought needed.
-        assert!((0.3..0.9).contains(&part(64, 1, 1e-6)));
+        assert_eq!(grids.completed_fraction(64, 1, 1e-6, 1e-6), None);
+        assert_eq!(grids.completed_fraction(64, 3, 1e-6, 1e-6), Some(1.0));
+        assert_eq!(grids.steps(), 15 + 4);
     }
 }

@@ -6,6 +6,7 @@ mod first_minute;
 mod fit_cli;
 mod measured_by_others;
 mod numbers_on_two_pages;
+mod pictures;
 mod refusals;
 mod relax_cli;
 mod scenario_files;

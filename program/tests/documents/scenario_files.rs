@@ -39,6 +39,35 @@ fn every_file_names_the_schema_which_is_todays() {
     }
 }
 
+/// The table of times on the page on speed has a row for each of them, and tells what takes long.
+#[test]
+fn every_file_has_a_row_of_times() {
+    let page = fs::read_to_string(root().join("docs/speed.md")).unwrap();
+    let (_, table) = page.split_once("<!-- verbs: benches/verbs.py -->").unwrap();
+    let (table, _) = table.split_once("<!-- end of verbs -->").unwrap();
+    let rows = table
+        .lines()
+        .filter(|line| line.starts_with("| `") && line.contains('/'));
+    let rows: Vec<&str> = rows.filter(|row| !row.starts_with("| scenario")).collect();
+    let named: Vec<String> = (scenario_files().iter())
+        .map(|file| {
+            let folder = file.parent().unwrap().file_name().unwrap().display();
+            format!("| `{folder}/{}` |", file.file_stem().unwrap().display())
+        })
+        .collect();
+    for name in &named {
+        let row = rows.iter().find(|row| row.starts_with(name));
+        let row = row.unwrap_or_else(|| panic!("{name}: benches/verbs.py BINARY {name}"));
+        let relaxed = row.split('|').nth(2).unwrap().trim().trim_matches('*');
+        assert!(relaxed == "–" || relaxed.parse::<f64>().is_ok(), "{row}");
+        if row.contains("**") {
+            let name = name.trim_matches(['|', ' ']);
+            assert!(table.contains(&format!("of {name}")), "{name} is not told");
+        }
+    }
+    assert_eq!(rows.len(), named.len(), "rows of scenarios that are gone");
+}
+
 /// In short time, and stable where stability can be told.
 #[test]
 fn every_scenario_file_ends_at_rest_within_its_tolerance() {

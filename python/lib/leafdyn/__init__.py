@@ -12,7 +12,7 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 """
 
 from ._branches import Boundary, Branch, Curve, Piece, Trace
-from ._errors import LeafWarning, MissingScenarioError, RefusedLeaf, ScenarioError
+from ._errors import Interrupted, LeafWarning, MissingScenarioError, RefusedLeaf, ScenarioError
 from ._explore import Exploration, explore
 from ._fit import Candidate, Fit, LikelihoodProfile, Parameter
 from ._fitting import fit
@@ -56,6 +56,7 @@ __all__ = [
     "Exploration",
     "Fit",
     "Frame",
+    "Interrupted",
     "Key",
     "LeafWarning",
     "LikelihoodProfile",

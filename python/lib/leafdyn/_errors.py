@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import errno
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,6 +61,45 @@ class MissingScenarioError(ScenarioError, FileNotFoundError):
 
     def __str__(self) -> str:
         return str(self.args[0])
+
+
+class Interrupted(KeyboardInterrupt):
+    """A run that Ctrl-C ended, with what it had found until then.
+
+    Who catches ``KeyboardInterrupt`` catches it, too. In a notebook, and at the prompt, where nothing does,
+    ``sys.last_value.partial`` has what was found.
+
+    >>> import leafdyn
+    >>> try:
+    ...     leaves = leafdyn.relax_many(["scenarios/paper/fig04.toml"] * 3)
+    ... except leafdyn.Interrupted as stop:
+    ...     leaves = [leaf for leaf in stop.partial if leaf is not None]
+    >>> len(leaves)
+    3
+    """
+
+    partial: Any
+    """What the function would have returned, as far as it came: the leaf with the outcome ``"out-of-time"``; of many
+    leaves the list with none in place of those that were not finished; of a sweep and a map the finished rows; of a
+    trace and a boundary what was verified until then; of a fit the best values; of a motion the outputs so far. None
+    where nothing was found."""
+
+    def __init__(self, partial: Any) -> None:
+        super().__init__(
+            "stopped by Ctrl-C: the partial of this exception has what was found until then "
+            "(in a notebook, and at the prompt: sys.last_value.partial)"
+        )
+        self.partial = partial
+
+
+@contextmanager
+def keeping(made: Callable[[Any], Any]) -> Iterator[None]:
+    """What is made of the partial result of a run that is interrupted."""
+    try:
+        yield
+    except Interrupted as stop:
+        stop.partial = made(stop.partial)
+        raise
 
 
 class LeafWarning(UserWarning):

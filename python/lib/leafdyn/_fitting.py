@@ -7,6 +7,7 @@ from numbers import Integral
 from typing import Any, TypeAlias, Union
 
 from ._arguments import numbers, switches, texts
+from ._errors import keeping
 from ._fit import Asked, Fit
 from ._leaf import Array
 from ._measured import Measured, measurements
@@ -115,7 +116,7 @@ def fit(
     tables = measurements(data, "data", leaf.units)
     others = None if candidates is None else measurements(candidates, "candidates", leaf.units)[0]
     asked = Asked(leaf, tables, keys, robust, maps, int(every), chosen, tolerance)
-    with reporter(progress) as heard:
+    with reporter(progress) as heard, keeping(lambda files: Fit(files, asked)):
         found = Fit(asked.files(heard, others), asked)
     for remark in found.remarks:
         warn(found.name, remark)

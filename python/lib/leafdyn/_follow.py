@@ -8,6 +8,7 @@ from typing import Any, SupportsIndex, overload
 from . import _leafdyn
 from ._arguments import numbers, switches, whole
 from ._branches import Boundary, Trace
+from ._errors import keeping
 from ._progress import Progress, reporter
 from ._range import Given, Range, ranges
 from ._relax import warn
@@ -131,7 +132,7 @@ def trace(
         )
     else:
         leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points)
-        with reporter(progress) as heard:
+        with reporter(progress) as heard, keeping(lambda parts: Trace(*parts)):
             found = Trace(*_leafdyn.trace(leaf._core, given[0], asked, heard))
     warn(found.name, found.remark)
     return found
@@ -217,7 +218,7 @@ def _boundary(
     progress: Progress,
 ) -> Boundary:
     leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points)
-    with reporter(progress) as heard:
+    with reporter(progress) as heard, keeping(lambda parts: Boundary(*parts)):
         return Boundary(*_leafdyn.boundary(leaf._core, along, across, asked, heard))
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, SupportsIndex, overload
 
 from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
-from ._errors import LeafWarning, RefusedLeaf
+from ._errors import LeafWarning, RefusedLeaf, keeping
 from ._leaf import Equilibrium
 from ._points import Points, point_table
 from ._progress import Heard, Progress, reporter
@@ -212,11 +212,13 @@ def relax(
     leaf = checked(scenario, set)
     if start is not None and not isinstance(start, Equilibrium):
         asked["points"] = point_table(start, "start", leaf.units)
-    with reporter(progress) as heard:
-        core = _leafdyn.relax(leaf._core, asked, heard)
-    if veins is not None:
-        leaf = Scenario(leaf, {"leaf.rods": len(core.lengths())})
-    found = Equilibrium(core, (leaf, asked))
+
+    def made(core: _leafdyn.Leaf) -> Equilibrium:
+        own = leaf if veins is None else Scenario(leaf, {"leaf.rods": len(core.lengths())})
+        return Equilibrium(core, (own, asked))
+
+    with reporter(progress) as heard, keeping(made):
+        found = made(_leafdyn.relax(leaf._core, asked, heard))
     warn(found.name, found.remark, found.error_in_veins_remark, *found.doubts)
     return found
 
@@ -358,16 +360,23 @@ def relaxed(
     leaves: list[Scenario | RefusedLeaf], asked: dict[str, Any], heard: Heard | None, told: bool
 ) -> list[Equilibrium | RefusedLeaf]:
     """Many leaves at rest, without a word about those that are not; refusals are told or raised."""
-    scenarios = [leaf for leaf in leaves if isinstance(leaf, Scenario)]
-    cores = iter(_leafdyn.relax_many([leaf._core for leaf in scenarios], asked, told, heard))
-    found: list[Equilibrium | RefusedLeaf] = []
-    for leaf in leaves:
-        if isinstance(leaf, RefusedLeaf):
-            found.append(leaf)
-            continue
-        core = next(cores)
-        found.append(RefusedLeaf(f"{leaf.name}: {core}") if isinstance(core, str) else Equilibrium(core, (leaf, asked)))
-    return found
+
+    def made(leaf: Scenario, core: _leafdyn.Leaf | str) -> Equilibrium | RefusedLeaf:
+        return RefusedLeaf(f"{leaf.name}: {core}") if isinstance(core, str) else Equilibrium(core, (leaf, asked))
+
+    def in_order(cores: Iterable[_leafdyn.Leaf | str | None]) -> Iterator[Equilibrium | RefusedLeaf | None]:
+        solved = iter(cores)
+        for leaf in leaves:
+            if isinstance(leaf, RefusedLeaf):
+                yield leaf
+            else:
+                core = next(solved)
+                yield None if core is None else made(leaf, core)
+
+    scenarios = [leaf._core for leaf in leaves if isinstance(leaf, Scenario)]
+    with keeping(lambda cores: list(in_order(cores))):
+        cores = _leafdyn.relax_many(scenarios, asked, told, heard)
+    return [leaf for leaf in in_order(cores) if leaf is not None]
 
 
 def modes(
@@ -402,8 +411,12 @@ def modes(
     whole(count=count)
     asked = asked_for("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
     leaf = checked(scenario, set)
-    with reporter(progress) as heard:
-        found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
+
+    def made(core: _leafdyn.Leaf) -> Equilibrium:
+        return Equilibrium(core, (leaf, asked))
+
+    with reporter(progress) as heard, keeping(made):
+        found = made(_leafdyn.relax(leaf._core, asked, heard))
     warn(found.name, found.remark, *found.doubts)
     return found
 
@@ -454,7 +467,11 @@ def sensitivities(
     words = texts("keys", keys, "stiffness.axial")
     asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
     leaf = checked(scenario, set)
-    with reporter(progress) as heard:
-        found = Equilibrium(_leafdyn.relax(leaf._core, asked, heard), (leaf, asked))
+
+    def made(core: _leafdyn.Leaf) -> Equilibrium:
+        return Equilibrium(core, (leaf, asked))
+
+    with reporter(progress) as heard, keeping(made):
+        found = made(_leafdyn.relax(leaf._core, asked, heard))
     warn(found.name, found.remark, *found.doubts)
     return found

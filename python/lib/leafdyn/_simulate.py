@@ -7,6 +7,7 @@ from typing import Any, SupportsIndex
 
 from . import _leafdyn
 from ._arguments import numbers, text, whole
+from ._errors import keeping
 from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
 from ._relax import warn
@@ -66,7 +67,11 @@ def simulate(
     ('completed', True)
     """
     leaf, core = _motion(scenario, set, method, segments, step, tolerance)
-    with reporter(progress) as heard:
+
+    def made(outputs: int) -> Motion | None:
+        return Motion(core, leaf.name, leaf.joined) if outputs else None
+
+    with reporter(progress) as heard, keeping(made):
         core.follow(heard)
     found = Motion(core, leaf.name, leaf.joined)
     warn(found.name, found.remark, *found.doubts)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import product
 from math import nan
@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _leafdyn
 from ._data import column_unit, pandas, unit
-from ._errors import RefusedLeaf
+from ._errors import Interrupted, RefusedLeaf, keeping
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
 from ._quantities import plain
@@ -147,23 +147,31 @@ def sweep(
     axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in named.items()}
     grid = list(product(*axes.values()))
     leaves = [_at(base, dict(zip(axes, point)), told) for point in grid]
-    if client is None:
-        with reporter(progress) as heard:
-            rows = _solved(leaves, wanted, kinds, asked, heard, told)
-    else:
-        one = partial(_row, wanted=wanted, kinds=kinds, asked=asked, told=told)
-        rows = client.gather(client.map(one, leaves, batch_size=max(1, len(leaves) // 100), pure=False))
+
+    def table(rows: Sequence[Row | None]) -> _DataFrame:
+        finished = [number for number, row in enumerate(rows) if row is not None]
+        points, cells = [grid[number] for number in finished], [row[1] for row in rows if row is not None]
+        found = package.DataFrame(
+            {key: _varied([point[at] for point in points]) for at, key in enumerate(axes)}
+            | {name: _column(package, kinds.get(name), [row[at] for row in cells]) for at, name in enumerate(wanted)},
+            index=None if len(finished) == len(grid) else finished,
+        )
+        units = {name: column_unit(base.units, name) for name in axes}
+        units |= {name: kind.unit(name, base.units) for name, kind in kinds.items()}
+        found.attrs = {"scenario": base.name, "units": {name: unit for name, unit in units.items() if unit is not None}}
+        return found
+
+    with keeping(table):
+        if client is None:
+            with reporter(progress) as heard:
+                rows = _solved(leaves, wanted, kinds, asked, heard, told)
+        else:
+            one = partial(_row, wanted=wanted, kinds=kinds, asked=asked, told=told)
+            rows = _gathered(client, client.map(one, leaves, batch_size=max(1, len(leaves) // 100), pure=False))
     failed = sum(not success for success, _ in rows)
     if failed:
         warn(base.name, f"{failed} of {len(rows)} leaves are not at rest within the tolerance: see the column outcome")
-    found = package.DataFrame(
-        {key: _varied([point[at] for point in grid]) for at, key in enumerate(axes)}
-        | {name: _column(package, kinds.get(name), [row[at] for _, row in rows]) for at, name in enumerate(wanted)}
-    )
-    units = {name: column_unit(base.units, name) for name in axes}
-    units |= {name: kind.unit(name, base.units) for name, kind in kinds.items()}
-    found.attrs = {"scenario": base.name, "units": {name: unit for name, unit in units.items() if unit is not None}}
-    return found
+    return table(rows)
 
 
 def _joined(keys: Keys) -> str:
@@ -214,6 +222,9 @@ class Kind(NamedTuple):
 
 Kinds = Mapping[str, Kind]
 
+Row: TypeAlias = tuple[bool, list[Any]]
+"""Whether a leaf is at rest, and what is wanted of it."""
+
 
 def _solved(
     leaves: list[Scenario | RefusedLeaf],
@@ -222,9 +233,9 @@ def _solved(
     asked: dict[str, Any],
     heard: Heard | None,
     told: bool,
-) -> list[tuple[bool, list[Any]]]:
-    """What is wanted of every leaf, and whether it is at rest."""
-    rows = []
+) -> list[Row]:
+    """What is wanted of every leaf, and whether it is at rest; where it is interrupted none of those not finished."""
+    rows: list[Row] = []
     at_once = min(AT_ONCE, AT_ONCE_WITH_MODES) if asked["mode_shapes"] else AT_ONCE
     for begin in range(0, len(leaves), at_once):
 
@@ -232,18 +243,34 @@ def _solved(
             if heard is not None:
                 heard(begin + done, len(leaves), text)
 
-        found = relaxed(leaves[begin : begin + at_once], asked, None if heard is None else passed_on, told)
+        def with_those_before(found: list[Equilibrium | RefusedLeaf | None]) -> list[Row | None]:
+            last = [None if leaf is None else _of(leaf, wanted, kinds) for leaf in found]
+            return [*rows, *last, *[None] * (len(leaves) - len(rows) - len(last))]
+
+        with keeping(with_those_before):
+            found = relaxed(leaves[begin : begin + at_once], asked, None if heard is None else passed_on, told)
         rows += [_of(leaf, wanted, kinds) for leaf in found]
     return rows
 
 
+def _gathered(client: Any, futures: list[Any]) -> list[Row]:
+    """The rows from the workers of a cluster; where it is interrupted none of those not finished."""
+    try:
+        found: list[Row] = client.gather(futures)
+    except KeyboardInterrupt:
+        rows = [future.result() if future.status == "finished" else None for future in futures]
+        client.cancel(futures)
+        raise Interrupted(rows) from None
+    return found
+
+
 def _row(
     leaf: Scenario | RefusedLeaf, wanted: Mapping[str, Of], kinds: Kinds, asked: dict[str, Any], told: bool
-) -> tuple[bool, list[Any]]:
+) -> Row:
     return _of(relaxed([leaf], asked, None, told)[0], wanted, kinds)
 
 
-def _of(leaf: Equilibrium | RefusedLeaf, wanted: Mapping[str, Of], kinds: Kinds) -> tuple[bool, list[Any]]:
+def _of(leaf: Equilibrium | RefusedLeaf, wanted: Mapping[str, Of], kinds: Kinds) -> Row:
     if isinstance(leaf, RefusedLeaf):
         said = {"outcome": leaf.outcome, "remark": leaf.remark, "success": False}
         return False, [said.get(name, kinds[name].missing if name in kinds else nan) for name in wanted]

@@ -7,6 +7,7 @@ from typing import Any, SupportsIndex
 
 from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
+from ._errors import keeping
 from ._leaf import Equilibrium
 from ._progress import Progress, reporter
 from ._range import Vary, ranges
@@ -99,10 +100,14 @@ def equilibria(
     numbers(tolerance=tolerance)
     switches(full_model=full_model)
     leaf = checked(scenario, set)
-    with reporter(progress) as heard:
-        files, found = _leafdyn.equilibria(leaf._core, tolerance, full_model, stations, heard)
-    leaves = [Equilibrium(core) for core, _, _ in found]
-    return Equilibria(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
+
+    def made(all: tuple[_leafdyn.Files, list[tuple[_leafdyn.Leaf, int, bool]]]) -> Equilibria:
+        files, found = all
+        leaves = [Equilibrium(core) for core, _, _ in found]
+        return Equilibria(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
+
+    with reporter(progress) as heard, keeping(made):
+        return made(_leafdyn.equilibria(leaf._core, tolerance, full_model, stations, heard))
 
 
 def stability_map(
@@ -160,7 +165,7 @@ def stability_map(
     axes = ranges(vary, lambda: checked(scenario, set).units)
     words = None if methods is None else texts("methods", methods, "semi-implicit")
     leaf = checked(scenario, set)
-    with reporter(progress) as heard:
+    with reporter(progress) as heard, keeping(Map):
         return Map(_leafdyn.map(leaf._core, axes, words, tolerance, cell_seconds, show, heard))
 
 

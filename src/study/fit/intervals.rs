@@ -529,7 +529,7 @@ impl LikelihoodProfile<'_, '_, '_> {
         let mut lost = f64::INFINITY;
         let mut failures = 0;
         for _ in 0..PROFILE.most_steps {
-            if self.stats.model.budget.is_used_up() {
+            if self.stats.model.must_end() {
                 return Ok(ProfileEndpoint::Lost(inside.distance));
             }
             let least = self.constrained_minimum(sign * reach, &inside, outside.as_ref(), progress);

@@ -64,7 +64,7 @@ const NULL_SINGULAR_VALUE_SEARCH: f64 = 3e-7;
 pub(super) enum GaussNewtonOutcome {
     Converged,
     StepLimit,
-    /// The budget of evaluations is used up.
+    /// The budget of evaluations is used up, or the limit of the run is reached.
     BudgetExhausted,
     /// No further step succeeds; with the reason of the last failure.
     Stuck(Option<ContinuationFailure>),
@@ -192,7 +192,7 @@ impl<'m, 'a> GaussNewtonIteration<'m, 'a> {
                 if !number || !worth {
                     return end(lost);
                 }
-                if self.model.budget.is_used_up() {
+                if self.model.must_end() {
                     return GaussNewtonOutcome::BudgetExhausted;
                 }
                 *evaluations += 1;

@@ -63,6 +63,20 @@ pub(super) struct FitMinimum {
 }
 
 impl FitMinimum {
+    /// The point of these statistics, converged or not, with what is told of it.
+    fn new(stats: &FitStatistics, fit: Fit, converged: bool) -> FitMinimum {
+        FitMinimum {
+            fit,
+            sum: stats.weighting.sum_of_squares(stats.point),
+            variance: stats.residual_deviation.powi(2),
+            significant_excess: (stats.coverage_factor * stats.residual_deviation).powi(2),
+            converged,
+            misfit: stats.model.relative_misfit(stats.point),
+            beyond_window: falls_beyond_window(stats),
+            theta: stats.point.theta.clone(),
+        }
+    }
+
     /// Whether this is the better answer. A minimum is not left for values that are none.
     pub fn is_preferred_to(&self, other: &FitMinimum) -> bool {
         match self.converged == other.converged {
@@ -127,7 +141,13 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             work.evaluations += searched.evaluations;
             attempts += 1;
             let there = model.continue_leaves(&near, &near.theta);
-            let there = there.or_else(|_| model.relax_leaves(&near.theta))?;
+            let there = there.or_else(|_| model.relax_leaves(&near.theta));
+            if there.is_err() && model.options.limit.reached() && near.gradients().next().is_some()
+            {
+                // No leaf comes to rest on finer grids any more: these are the answer.
+                break self.stopped_minimum(&coarse, &near, work);
+            }
+            let there = there?;
             let mut last = GaussNewtonIteration::new(model, weighting, &mut searching);
             last.reuses_derivatives = true;
             last.most_steps = last.most_steps.min(self.most_steps);
@@ -138,6 +158,9 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
             } = last.run(there);
             work.evaluations += 1 + evaluations;
             work.accurate += 1 + evaluations;
+            if least.gradients().next().is_none() && model.options.limit.reached() {
+                break self.stopped_minimum(&coarse, &near, work);
+            }
             let is_lost =
                 end == GaussNewtonOutcome::Stuck(Some(ContinuationFailure::OtherEquilibrium));
             if is_lost
@@ -182,21 +205,22 @@ impl<'m, 'a> LocalFitSearch<'m, 'a> {
                     intervals::parameters_without_intervals(&stats),
                 ),
             };
-            break FitMinimum {
-                fit: assemble_fit(&stats, &end, parameters, work, self.candidates),
-                sum: weighting.sum_of_squares(stats.point),
-                variance: stats.residual_deviation.powi(2),
-                significant_excess: (stats.coverage_factor * stats.residual_deviation).powi(2),
-                converged: end == GaussNewtonOutcome::Converged,
-                misfit: model.relative_misfit(stats.point),
-                beyond_window: falls_beyond_window(&stats),
-                theta: stats.point.theta.clone(),
-            };
+            let fit = assemble_fit(&stats, &end, parameters, work, self.candidates);
+            break FitMinimum::new(&stats, fit, end == GaussNewtonOutcome::Converged);
         };
         if jumps > 0 {
             found.fit.remarks.push(FitRemark::JumpedOnTheWay);
         }
         Ok(found)
+    }
+
+    /// The point on coarse grids at which the limit of the run ended the search.
+    fn stopped_minimum(&self, coarse: &FitModel, near: &FitPoint, work: FitWork) -> FitMinimum {
+        let stats = FitStatistics::new(coarse, self.weighting, self.has_known_deviations, near);
+        let parameters = intervals::parameters_without_intervals(&stats);
+        let end = GaussNewtonOutcome::BudgetExhausted;
+        let fit = assemble_fit(&stats, &end, parameters, work, &[]);
+        FitMinimum::new(&stats, fit, false)
     }
 
     fn statistics<'p>(&'p self, point: &'p FitPoint) -> FitStatistics<'p, 'a> {

@@ -231,8 +231,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         let doubtful = first
             .as_ref()
             .map_or(true, |first| self.suspects_better_minimum(first));
-        let budget = &self.model.budget;
-        let plain = (began.initial).filter(|_| doubtful && !budget.is_used_up());
+        let plain = (began.initial).filter(|_| doubtful && !self.model.must_end());
         let plain =
             plain.and_then(|initial| self.search_from_point(&initial, usize::MAX, progress).ok());
         let mut best = match (first, plain) {
@@ -247,7 +246,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
             (first, None) => first?,
         };
         for _ in 0..GLOBAL_SEARCH.most_searches {
-            let further = (best.beyond_window && !budget.is_used_up())
+            let further = (best.beyond_window && !self.model.must_end())
                 .then(|| self.search_from_values(&best, &best.theta, progress));
             let further = further.flatten();
             match further.filter(|again| again.is_preferred_to(&best)) {
@@ -257,7 +256,7 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         }
         let mut others = AlternativeMinima::default();
         for _ in 0..GLOBAL_SEARCH.most_searches {
-            if budget.is_used_up() {
+            if self.model.must_end() {
                 break;
             }
             others = match self.suspects_better_minimum(&best) {
@@ -289,8 +288,10 @@ impl<'a> GlobalFitSearch<'_, 'a> {
         }
         fit.tried = others.tried;
         fit.remarks.splice(0..0, remark);
-        if budget.is_used_up() {
-            let evaluations = budget.limit();
+        if self.model.options.limit.reached() {
+            fit.remarks.insert(0, FitRemark::Stopped);
+        } else if self.model.budget.is_used_up() {
+            let evaluations = self.model.budget.limit();
             fit.remarks
                 .insert(0, FitRemark::BudgetUsedUp { evaluations });
         }

@@ -134,6 +134,12 @@ pub(super) struct CoarseModel<'a> {
 }
 
 impl<'a> FitModel<'a> {
+    /// Whether the search ends here with the best that was found: the budget is used up, or the limit of the
+    /// run is reached, after which no leaf comes to rest any more.
+    pub fn must_end(&self) -> bool {
+        self.budget.is_used_up() || self.options.limit.reached()
+    }
+
     pub fn new(
         base: &'a BaseScenario,
         coordinates: &'a [FitCoordinate],

@@ -16,6 +16,9 @@ remarks! {
             /// How often leaves may be relaxed.
             evaluations: usize,
         } = "budget-used-up",
+        /// A limit of the run that was reached.
+        #[error("stopped before its end: this is the best that was found so far")]
+        Stopped = "stopped",
         /// A search that began elsewhere than with the numbers of the scenario.
         #[error(
             "{}; the search began with {values}",

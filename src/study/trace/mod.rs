@@ -19,7 +19,7 @@ use crate::relax::{
     without_wind_or_followers,
 };
 use crate::run::{Instant, Limit, RefusedOption};
-use crate::scenario::{EntryPath, Key, Scenario, plausibility_warnings};
+use crate::scenario::{EntryPath, Key, Scenario};
 use crate::shape::Undulation;
 use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::result::{ForceDisplacementLine, LoadedTip, TraceUntil};
@@ -265,28 +265,10 @@ fn trace_with_points_from(
     let check = |least| checked_segments(&family, request.segments, least);
     let wanted = request.segments.map(check).transpose()?;
     let mut trace = Trace {
-        scenario: scenario.name.clone(),
-        keys: keys.clone(),
-        range: ends,
-        log: vary.log,
-        show: Vec::new(),
-        units: scenario.units.clone(),
-        rods: scenario.rods.len(),
-        held: scenario.held_tip.is_some(),
-        grips: scenario.grips.len(),
-        joined: scenario.joined,
         segments: wanted.unwrap_or(2 * (rest.shape.stations.len() - 1)),
-        tolerance,
         switch: request.switch,
         until: request.until,
-        complete: false,
-        remark: None,
-        assumed: None,
-        doubts: plausibility_warnings(&scenario),
-        branches: Vec::new(),
-        law: None,
-        factorizations: 0,
-        wall_seconds: 0.0,
+        ..Trace::before_first_point(&scenario, vary, tolerance)
     };
     let began = match rest.stability.negative_eigenvalues {
         Some(_) => begin_branch(&family, (&rest, fraction), &options, wanted).map_err(|why| {

@@ -5,11 +5,11 @@ use crate::leaf::BucklingMode;
 use crate::numbers::largest;
 use crate::relax::{AssumedMotion, DominantMotion, MotionInstability};
 use crate::run::join_remarks;
-use crate::scenario::{PlausibilityWarning, Units};
+use crate::scenario::{PlausibilityWarning, Scenario, Units, plausibility_warnings};
 use crate::shape::{Undulation, serialize_tips};
 use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::serialize_axis;
-use crate::study::vary::AXIS_NAMES;
+use crate::study::vary::{AXIS_NAMES, ParameterSweep};
 use crate::study::{ParameterKeys, UnknownWord};
 use glam::DVec3;
 use serde::ser::{Serialize, SerializeMap, SerializeStruct, Serializer};
@@ -78,6 +78,40 @@ pub struct Trace {
     pub factorizations: usize,
     /// Total time, in seconds.
     pub wall_seconds: f64,
+}
+
+impl Trace {
+    /// The trace of this leaf through a number, before its first point.
+    pub(super) fn before_first_point(
+        scenario: &Scenario,
+        vary: &ParameterSweep,
+        tolerance: f64,
+    ) -> Self {
+        Trace {
+            scenario: scenario.name.clone(),
+            keys: vary.keys.clone(),
+            range: vary.ends(),
+            log: vary.log,
+            show: Vec::new(),
+            units: scenario.units.clone(),
+            rods: scenario.rods.len(),
+            held: scenario.held_tip.is_some(),
+            grips: scenario.grips.len(),
+            joined: scenario.joined,
+            segments: 0,
+            tolerance,
+            switch: false,
+            until: None,
+            complete: false,
+            remark: None,
+            assumed: None,
+            doubts: plausibility_warnings(scenario),
+            branches: Vec::new(),
+            law: None,
+            factorizations: 0,
+            wall_seconds: 0.0,
+        }
+    }
 }
 
 /// One branch.

@@ -10,7 +10,7 @@ use crate::relax::{
     relax_on_grids,
 };
 use crate::run::{Instant, UnmodelledFeature};
-use crate::scenario::{Scenario, plausibility_warnings};
+use crate::scenario::Scenario;
 use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::result::{PointKind, PointMotion, Trace, TraceBranch, TracePoint};
 use crate::study::trace::{
@@ -85,32 +85,15 @@ pub(super) fn trace_without_potential(
         remark: relaxed.result.remark.clone(),
     });
     let mut trace = Trace {
-        scenario: scenario.name.clone(),
-        keys: keys.clone(),
-        range: ends,
-        log: vary.log,
-        show: Vec::new(),
-        units: scenario.units.clone(),
-        rods: scenario.rods.len(),
-        held: scenario.held_tip.is_some(),
-        grips: scenario.grips.len(),
-        joined: scenario.joined,
         segments: segments.unwrap_or(0),
-        tolerance,
-        switch: false,
         until: request.until,
-        complete: false,
         remark,
         assumed: Some(AssumedMotion {
             uniform_density: false,
             no_rotary_inertia: false,
             no_damping: false,
         }),
-        doubts: plausibility_warnings(&scenario),
-        branches: Vec::new(),
-        law: None,
-        factorizations: 0,
-        wall_seconds: 0.0,
+        ..Trace::before_first_point(&scenario, vary, tolerance)
     };
     if rests {
         let first = told_with_small_motions(family.first_leaf(), &options, tolerance, relaxed);

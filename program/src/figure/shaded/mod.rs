@@ -13,7 +13,9 @@ use crate::figure::drawing::space::{ParallelProjection, ViewAngles};
 use crate::figure::drawing::veins::is_vein_drawn;
 use crate::figure::drawing::{Drawing, Stroke, TEXT_COLOR, TextAnchor, is_drawable};
 use crate::figure::scenario::FigureSetting;
-use crate::figure::shaded::light::{LightSubset, Lighting, SUN_SHARE, SpaceTriangle, SurfaceLight};
+use crate::figure::shaded::light::{
+    GroundShadow, LightSubset, Lighting, SUN_SHARE, SpaceTriangle, SurfaceLight,
+};
 use crate::figure::shaded::raster::{CornerWeights, NearestTriangles, ProjectedTriangle};
 use crate::report::numbers::format_four_digits;
 use glam::{DQuat, DVec2, DVec3};
@@ -394,9 +396,10 @@ struct Picture<'s> {
     projected: Vec<ProjectedTriangle>,
     /// The middle of the ground that is seen.
     ground: DVec3,
-    /// The low and the high corner of the ground that is shaded from the sun.
-    sun_shadow: [DVec2; 2],
+    /// The ground that may be shaded from the sun.
+    ground_shadow: GroundShadow,
     sky_on_ground: SkyOnGround,
+    srgb: SrgbEncoding,
 }
 
 impl<'s> Picture<'s> {
@@ -414,8 +417,9 @@ impl<'s> Picture<'s> {
             projected: (scene.triangles.iter())
                 .map(|it| camera.project(&it.corners))
                 .collect(),
-            sun_shadow: lighting.sun_shadow_bounds(&scene.casters, height),
+            ground_shadow: lighting.ground_shadow(&scene.casters, height),
             sky_on_ground: SkyOnGround::new(&lighting, ground, radius),
+            srgb: SrgbEncoding::new(),
             scene,
             camera,
             lighting,
@@ -423,23 +427,27 @@ impl<'s> Picture<'s> {
         }
     }
 
-    /// The color of the ground at a sample.
-    fn ground_color(&self, column: usize, row: usize, subset: LightSubset) -> DVec3 {
+    /// The color of the ground at a sample, in the light of some of the sun where it may be shaded.
+    fn ground_color(&self, [column, row]: [usize; 2], subset: LightSubset) -> DVec3 {
         let point = self.camera.on_ground(column, row, self.ground.z);
         let size = self.camera.samples.map(|samples| samples as f64);
         let from_middle = |at: usize, size: f64| ((2 * at + 1) as f64 / size - 1.0).powi(4);
         let away = (from_middle(column, size[0]) + from_middle(row, size[1]))
             .sqrt()
             .sqrt();
-        let [low, high] = self.sun_shadow;
-        let flat = point.truncate();
-        let sun = match flat.cmpge(low).all() && flat.cmple(high).all() {
+        let sun = match self.ground_shadow.may_shade(point) {
             true => self.lighting.sun_on_ground(point, subset),
             false => SUN_SHARE,
         };
         let light = sun + self.sky_on_ground.at(point);
         let surface = BACKGROUND.lerp(GROUND, remaining(&GROUND_FADE, away));
         surface * (1.0 + (light - 1.0) * remaining(&SHADOW_FADE, away))
+    }
+
+    /// Whether the ground at a sample may be shaded from the sun.
+    fn may_be_shaded(&self, [column, row]: [usize; 2]) -> bool {
+        let point = self.camera.on_ground(column, row, self.ground.z);
+        self.ground_shadow.may_shade(point)
     }
 
     /// The color of a triangle at a sample that it covers.
@@ -475,6 +483,14 @@ impl<'s> Picture<'s> {
         let mut bytes = Vec::with_capacity(4 * rows.len() * PICTURE.width);
         for row in rows {
             for column in 0..PICTURE.width {
+                let middle = [column, row].map(|at| at * PIXEL_SAMPLES + PIXEL_SAMPLES / 2);
+                if nearest.is_free(middle, PIXEL_SAMPLES / 2) && !self.may_be_shaded(middle) {
+                    // Open ground changes little within a pixel.
+                    let color = self.ground_color(middle, LightSubset::ALL);
+                    bytes.extend(color.to_array().map(|light| self.srgb.encode(light)));
+                    bytes.push(u8::MAX);
+                    continue;
+                }
                 let mut sum = DVec3::ZERO;
                 for sample in 0..PIXEL_SAMPLES * PIXEL_SAMPLES {
                     let x = column * PIXEL_SAMPLES + sample % PIXEL_SAMPLES;
@@ -490,11 +506,11 @@ impl<'s> Picture<'s> {
                             let weights = self.projected[number].corner_weights(x, y);
                             self.surface_color(number, weights, subset).min(DVec3::ONE)
                         }
-                        None => self.ground_color(x, y, subset),
+                        None => self.ground_color([x, y], subset),
                     };
                 }
                 let color = sum / (PIXEL_SAMPLES * PIXEL_SAMPLES) as f64;
-                bytes.extend(color.to_array().map(encode_srgb));
+                bytes.extend(color.to_array().map(|light| self.srgb.encode(light)));
                 bytes.push(u8::MAX);
             }
         }
@@ -577,12 +593,25 @@ fn sun_direction(view: ViewAngles) -> DVec3 {
 }
 
 /// Linear light as a byte (IEC 61966-2-1).
-fn encode_srgb(light: f64) -> u8 {
-    let value = match light {
-        light if light <= 0.003_130_8 => 12.92 * light.max(0.0),
-        light => 1.055 * light.min(1.0).powf(1.0 / 2.4) - 0.055,
-    };
-    (255.0 * value).round() as u8
+struct SrgbEncoding {
+    /// The least light of every byte from 1 on.
+    least: [f64; 255],
+}
+
+impl SrgbEncoding {
+    fn new() -> Self {
+        let light = |value: f64| match value {
+            value if value <= 0.040_45 => value / 12.92,
+            value => ((value + 0.055) / 1.055).powf(2.4),
+        };
+        SrgbEncoding {
+            least: std::array::from_fn(|byte| light((byte as f64 + 0.5) / 255.0)),
+        }
+    }
+
+    fn encode(&self, light: f64) -> u8 {
+        self.least.partition_point(|least| *least <= light) as u8
+    }
 }
 
 /// Writes the picture of a leaf at rest as PNG.
@@ -773,8 +802,9 @@ mod tests {
             (1.0, 255),
             (7.0, 255),
         ];
+        let srgb = SrgbEncoding::new();
         for (light, byte) in known {
-            assert!(encode_srgb(light).abs_diff(byte) <= 1, "{light}");
+            assert!(srgb.encode(light).abs_diff(byte) <= 1, "{light}");
         }
     }
 }

@@ -121,6 +121,16 @@ impl NearestTriangles {
         found
     }
 
+    /// Whether no triangle covers a sample, nor one within so many columns and rows.
+    pub fn is_free(&self, [column, row]: [usize; 2], around: usize) -> bool {
+        let columns = column - around..=column + around;
+        (row - around..=row + around).all(|row| {
+            let first = (row - self.rows.start) * self.width;
+            let samples = &self.nearest[first + columns.start()..=first + columns.end()];
+            samples.iter().all(|nearest| *nearest == UNCOVERED)
+        })
+    }
+
     /// The number of the nearest triangle at a sample, if one covers it.
     pub fn triangle(&self, column: usize, row: usize) -> Option<usize> {
         let at = (row - self.rows.start) * self.width + column;
