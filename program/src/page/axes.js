@@ -1,6 +1,9 @@
 // The box around the leaf: axes with ticks, gravity and wind, captions and the colour scale, on the canvas below the leaf.
 const AXIS_NAMES = ["x", "y", "z"];
-const font = (px) => `${px}px system-ui, "DejaVu Sans", sans-serif`;
+/// On a projector everything is read from far away.
+const projected = matchMedia("(min-width: 1600px)");
+const enlarged = (px) => (projected.matches ? 1.3 * px : px);
+const font = (px) => `${enlarged(px)}px system-ui, "DejaVu Sans", sans-serif`;
 
 /// The box that holds all leaves, the base among them.
 function boxOf(leaves) {
@@ -54,6 +57,14 @@ function drawAxes(pen, box, place, small, named) {
   const size = small ? 10 : 12;
   pen.lineWidth = 1;
   floor(pen, box, place);
+  // Numbers of two axes that meet in a corner of the box are not written over one another.
+  const taken = [];
+  const isFree = (x, y, wide) => {
+    const mine = [x - wide / 2 - 2, y - enlarged(size) / 2, x + wide / 2 + 2, y + enlarged(size) / 2];
+    const free = taken.every((other) => mine[0] > other[2] || mine[2] < other[0] || mine[1] > other[3] || mine[3] < other[1]);
+    if (free) taken.push(mine);
+    return free;
+  };
   for (const edge of edges(box, place)) {
     const { axis, from, p, q, mid } = edge;
     const way = [q[0] - p[0], q[1] - p[1]];
@@ -74,8 +85,12 @@ function drawAxes(pen, box, place, small, named) {
       const at = place(from.map((x, k) => (k === axis ? value : x)));
       line(pen, at, [at[0] + 5 * out[0], at[1] + 5 * out[1]]);
       const text = tickText(value, decimals, step);
-      widest = Math.max(widest, pen.measureText(text).width);
-      pen.fillText(text, at[0] + 9 * out[0], at[1] + (out[1] > 0.5 ? 13 : out[1] < -0.5 ? -13 : 9 * out[1]));
+      const breadth = pen.measureText(text).width;
+      const [x, y] = [at[0] + 9 * out[0], at[1] + (out[1] > 0.5 ? 13 : out[1] < -0.5 ? -13 : 9 * out[1])];
+      const middle = x + ({ left: 0.5, right: -0.5 }[pen.textAlign] || 0) * breadth;
+      if (!isFree(middle, y, breadth)) continue;
+      widest = Math.max(widest, breadth);
+      pen.fillText(text, x, y);
     }
     pen.fillStyle = css("--ink");
     pen.font = font(size + 1);

@@ -257,7 +257,7 @@ function drawLabel(pen, panel, small) {
   const [first, second] = pen.measureText(panel.label).width > width - 12 ? twoLines(panel.label) : [panel.label, ""];
   const y = top + (small ? 4 : 46);
   pen.fillText(first, left + width / 2, y, width - 12);
-  pen.fillText(second, left + width / 2, y + 15, width - 12);
+  pen.fillText(second, left + width / 2, y + enlarged(15), width - 12);
 }
 
 /// A text divided at the comma or the space nearest to its middle.
