@@ -269,7 +269,8 @@ class Sliders {
   }
 }
 
-const withItsUnit = (words, unit) => (unit ? `${words} / ${unit}` : words);
+/// A unit stays in one line with its stroke.
+const withItsUnit = (words, unit) => (unit ? `${words} /\u00a0${unit.replaceAll(" ", "\u00a0")}` : words);
 
 /// The slider of the growth of the margins, in per cent.
 function marginsSlider(value) {

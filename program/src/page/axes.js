@@ -58,7 +58,7 @@ function drawAxes(pen, box, place, small, named) {
   pen.lineWidth = 1;
   floor(pen, box, place);
   // Numbers of two axes that meet in a corner of the box are not written over one another.
-  const taken = [];
+  const [taken, names] = [[], []];
   const isFree = (x, y, wide) => {
     const mine = [x - wide / 2 - 2, y - enlarged(size) / 2, x + wide / 2 + 2, y + enlarged(size) / 2];
     const free = taken.every((other) => mine[0] > other[2] || mine[2] < other[0] || mine[1] > other[3] || mine[3] < other[1]);
@@ -92,12 +92,18 @@ function drawAxes(pen, box, place, small, named) {
       widest = Math.max(widest, breadth);
       pen.fillText(text, x, y);
     }
-    pen.fillStyle = css("--ink");
-    pen.font = font(size + 1);
-    if (!named) continue;
     const away = Math.abs(out[0]) > 0.5 ? 20 + widest : small ? 27 : 32;
-    const name = withUnit(AXIS_NAMES[axis], lengthUnit);
-    pen.fillText(name, (p[0] + q[0]) / 2 + away * out[0], (p[1] + q[1]) / 2 + away * out[1]);
+    names.push({ name: withUnit(AXIS_NAMES[axis], lengthUnit), align: pen.textAlign, at: [(p[0] + q[0]) / 2 + away * out[0], (p[1] + q[1]) / 2 + away * out[1]], out });
+  }
+  pen.fillStyle = css("--ink");
+  pen.font = font(size + 1);
+  for (const { name, align, at, out } of named ? names : []) {
+    pen.textAlign = align;
+    const breadth = pen.measureText(name).width;
+    const middle = ({ left: 0.5, right: -0.5 }[align] || 0) * breadth;
+    // Farther out, where numbers stand in its place.
+    const [x, y] = [0, 8, 16, 24].map((k) => [at[0] + k * out[0], at[1] + k * out[1]]).find(([x, y]) => isFree(x + middle, y, breadth)) || at;
+    pen.fillText(name, x, y);
   }
 }
 

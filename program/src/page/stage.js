@@ -176,7 +176,7 @@ function frustum(width, height) {
   const { camera, fit } = space;
   const small = space.panels.length > 1;
   // A title stands above a small panel, names of axes below the box of a large one.
-  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 76, 70] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
+  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 76, 84] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
   const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - above - below) / fit[1]);
   camera.right = width / 2 / scale;
   camera.left = -camera.right;
