@@ -191,9 +191,10 @@ async function ask(name) {
 function tellLesson(known) {
   // Until its leaf is open, numbers are those of another one.
   if (!lesson || !known || !step.open) return;
-  // A step is a change of a slider; the same leaf, solved again, is none.
+  // A step is a change of a slider, from where it was taken to where it is let go; the same leaf, solved again, is none.
   const values = JSON.stringify([...sliders.values]);
-  if (values !== step.values) step = { open: true, before: step.known || known, values };
+  if (values !== step.values) step = { open: true, before: step.dragged ? step.before : step.known || known, values, dragged: Boolean(now.dragged) };
+  else if (!now.dragged) step.dragged = false;
   step.known = known;
   find("said").replaceChildren(...lesson.said(known, step.before || known).filter(Boolean).map((text) => Object.assign(document.createElement("span"), { textContent: `${text} ` })));
   if (lesson.picture) lesson.picture(find("lesson-picture"), known);
@@ -243,6 +244,8 @@ function drawPlane(svg) {
       sliders.values.set("stiffness.torsion", Number(b.toPrecision(3)));
       sliders.set("scale:stiffness.bending_2", Number((100 * a).toPrecision(3)), event.type === "pointerup");
       sliders.placeAll();
+      // The point is under the pointer, also where the leaf takes its time.
+      drawPlane(svg);
     };
     svg.onpointerdown = (event) => (svg.setPointerCapture(event.pointerId), go(event));
     svg.onpointermove = svg.onpointerup = go;
