@@ -23,7 +23,7 @@ GALLERY = json.loads((ROOT / "site/gallery.json").read_text())
 # Questions with which the live page begins, by their names in its address.
 QUESTIONS = {
     "ripple": "Why do leaf margins ripple?",
-    "snap": "Why does it snap?",
+    "snap": "Why does a bent strip snap?",
     "arch": "Why does a grass leaf arch and not fall?",
 }
 
@@ -87,14 +87,16 @@ def reference(to: Path) -> None:
 
 
 def first_screen(to: Path) -> None:
-    """The live page on the first screen of the site, behind the first paragraph, if it was built."""
+    """The live page on the first screen of the site, behind the first paragraph of words, if it was built."""
     if not (to / "live.html").exists():
         return
     home = to / "README.md"
-    title, first, rest = home.read_text().split("\n\n", 2)
+    blocks = home.read_text().split("\n\n")
+    # The title and the pictures come before it.
+    words = next(k for k, block in enumerate(blocks) if not block.startswith(("#", "|")))
     picture = '<img src="docs/live.png" alt="A leaf on the live page, with its sliders">'
     link = f'<a class="live-leaf" href="live.html"><span>Open the live page: move a slider, and the leaf follows</span>{picture}</a>'
-    home.write_text("\n\n".join([title, first, link, rest]))
+    home.write_text("\n\n".join([*blocks[: words + 1], link, *blocks[words + 1 :]]))
 
 
 def address(scenario: Path, sliders: list[dict[str, object]]) -> str:

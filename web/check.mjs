@@ -1,6 +1,8 @@
 // Opens the live page in a browser without a network, and uses it as a reader does:
 //   (cd program/src/page/three && npm ci) && node web/check.mjs [CLAIM ...]
-// The browser is Chromium, CHROMIUM or /usr/bin/chromium; WebGL is drawn by swiftshader.
+// The browser is Chromium, CHROMIUM or /usr/bin/chromium, as it is on a machine without a graphics processor: WebGL is drawn by
+// swiftshader, and its layers are put together in software, too. (With --use-angle=swiftshader that would be done by swiftshader:
+// half as many pictures a second, and a browser that nobody has.)
 import assert from "node:assert/strict";
 import { readFileSync, statSync } from "node:fs";
 import { createRequire } from "node:module";
@@ -12,10 +14,10 @@ const web = dirname(fileURLToPath(import.meta.url));
 const { chromium } = createRequire(join(web, "../program/src/page/three/package.json"))("playwright-core");
 const file = join(web, "dist/live.html");
 const keep = process.env.KEEP;
-const browser = await chromium.launch({ executablePath: process.env.CHROMIUM || "/usr/bin/chromium", args: ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"] });
+const browser = await chromium.launch({ executablePath: process.env.CHROMIUM || "/usr/bin/chromium", args: ["--no-sandbox", "--disable-gpu", "--enable-unsafe-swiftshader"] });
 
 /// Opens the page; whatever goes wrong on it, or is asked of a network, ends the test.
-async function open(hash = "", options = {}) {
+async function open(hash = "#all", options = {}) {
   const context = await browser.newContext({ offline: true, viewport: { width: 1280, height: 800 }, ...options });
   const page = await context.newPage();
   const wrong = [];
@@ -100,7 +102,7 @@ const waves = (page) => page.evaluate(() => Number(/([\d.]+) high/.exec(document
 /// lies flat; the address leads to the same leaf, seen from the same place. By mouse alone, and by keyboard alone.
 async function flattens(byKeys) {
   const name = byKeys ? "flat-by-keys" : "flat-by-mouse";
-  const page = await open("", { permissions: ["clipboard-read", "clipboard-write"] });
+  const page = await open("#all", { permissions: ["clipboard-read", "clipboard-write"] });
   const [bending, torsion] = ["scale:stiffness.bending_2", "stiffness.torsion"];
   if (byKeys) {
     await tabTo(page, "gallery");
@@ -186,7 +188,7 @@ async function sharesOneOfSeveral() {
 
 /// Whatever can be used has a name, and whatever can be touched is large enough for a finger.
 async function named() {
-  const page = await open("", { viewport: { width: 400, height: 800 }, hasTouch: true, isMobile: true });
+  const page = await open("#all", { viewport: { width: 400, height: 800 }, hasTouch: true, isMobile: true });
   const client = await page.context().newCDPSession(page);
   const { nodes } = await client.send("Accessibility.getFullAXTree");
   const used = ["button", "slider", "spinbutton", "checkbox", "combobox", "textbox", "image", "DisclosureTriangle"];
@@ -273,36 +275,40 @@ async function hostile() {
 /// short is said, not refused.
 async function fast() {
   const page = await open();
-  console.log(`live.html: ${(statSync(file).size / 1e6).toFixed(2)} MB (2.5 asked), opened in ${page.opened} ms (1500 asked)`);
-  const drags = [["paper/fig04.toml", "load.gravity[2]", -2, -0.5], ["measured/blade.toml", "load.g[2]", -981, -200], ["measured/grass.toml", "section.young", 1e5, 2e5]];
-  for (const [name, key, low, high] of drags) {
+  console.log(`live.html: ${(statSync(file).size / 1e6).toFixed(2)} MB (3 asked), opened in ${page.opened} ms (1500 asked)`);
+  await page.click("#foresee");
+  const names = await page.evaluate(() => window.leafdyn.gallery.map(({ name }) => name));
+  const slow = [];
+  for (const name of names) {
     await page.choose(name);
-    await page.waitForTimeout(1200);
-    const [solved, drawn, took] = await page.evaluate(
-      async ([key, low, high]) => {
-        const { now, front, sliders, stage } = window.leafdyn;
-        const [count, drawn, begun] = [now.count, stage().shown.drawn, performance.now()];
-        const times = [];
-        for (let time = 0; time < 3000; time = performance.now() - begun) {
-          sliders.set(key, low + (high - low) * (0.5 - 0.5 * Math.cos(time / 500)), false);
-          await new Promise(requestAnimationFrame);
-          times.push(front.took);
-        }
-        const seconds = (performance.now() - begun) / 1000;
-        return [(now.count - count) / seconds, (stage().shown.drawn - drawn) / seconds, times.sort((a, b) => a - b)[times.length >> 1]];
-      },
-      [key, low, high],
-    );
-    console.log(`  ${name}: ${solved.toFixed(0)} equilibria and ${drawn.toFixed(0)} pictures a second (30 asked), ${took.toFixed(1)} ms in the solver`);
-    assert.match(await page.textContent("#found"), /^stable|moves on/);
+    await page.rest();
+    await page.waitForFunction(() => window.leafdyn.back.waiting.size === 0, null, { timeout: 60000 });
+    const { key, solved, drawn, took } = await page.evaluate(async () => {
+      const { now, front, sliders, stage } = window.leafdyn;
+      const { key, high } = sliders.shown.find(({ whole }) => !whole);
+      const value = sliders.value(key) || 0.1 * high;
+      const [count, pictures, begun] = [now.count, stage().shown.drawn, performance.now()];
+      const times = [];
+      for (let time = 0; time < 2000; time = performance.now() - begun) {
+        sliders.set(key, value * (1 + 0.1 * Math.sin(time / 500)), false);
+        await new Promise(requestAnimationFrame);
+        times.push(front.took);
+      }
+      const seconds = (performance.now() - begun) / 1000;
+      return { key, solved: (now.count - count) / seconds, drawn: (stage().shown.drawn - pictures) / seconds, took: times.sort((a, b) => a - b)[times.length >> 1] };
+    });
+    if (drawn < 30) slow.push(name);
+    console.log(`  ${name}, ${key}: ${solved.toFixed(0)} equilibria and ${drawn.toFixed(0)} pictures a second, ${took.toFixed(1)} ms in the solver`);
+    assert.match(await page.textContent("#found"), /equilibrium|moves on/, name);
   }
+  console.log(`  fewer than the 30 pictures a second that are asked of an idle machine: ${slow.join(", ") || "none"}`);
   assert(page.opened < 20000);
   await page.done("fast");
 }
 
 /// The picture in the documents: an undulating leaf, whose veins are made stiffer.
 async function picture() {
-  const page = await open("", { viewport: { width: 1280, height: 860 } });
+  const page = await open("#all", { viewport: { width: 1280, height: 860 } });
   await page.choose("study/undulation.toml");
   await page.check("#surface");
   const key = "scale:stiffness.bending_2";
@@ -409,7 +415,7 @@ async function questions() {
     assert.equal(await page.evaluate(() => window.leafdyn.sliders.shown.length), { ripple: 3, snap: 2, arch: 4 }[name]);
   };
   await ask("ripple");
-  assert.match(await said(), /30 % longer.*ripple, 0\.1\d* L/);
+  assert.match(await said(), /30 % longer.*ripple, 0\.1\d* of the length high/);
   if (keep) await page.screenshot({ path: join(keep, "live-question-ripple.png") });
   // A point of the plane is pulled to where the leaf is flat, and the leaf follows.
   const box = await page.locator("#lesson-picture").boundingBox();
@@ -456,7 +462,7 @@ async function questions() {
 
 /// On a telephone, in the dark.
 async function narrow() {
-  const page = await open("", { viewport: { width: 400, height: 800 }, colorScheme: "dark" });
+  const page = await open("#all", { viewport: { width: 400, height: 800 }, colorScheme: "dark" });
   const wide = await page.evaluate(() => document.documentElement.scrollWidth);
   assert(wide <= 400, `${wide} px wide`);
   // The picture stays while the sliders scroll.

@@ -18,7 +18,7 @@ shear_2 = 100.0
 shear_3 = 100.0
 
 [load]
-tip_force = [-2.8, 0.0, 0.5]
+tip_force = [-2.8, 0.0, 0.05]
 `;
 
 /// One blade of grass, nearly upright, in cm, N and s: the unit of mass is 100 kg.
@@ -72,7 +72,7 @@ const LESSONS = {
     scenario: () => gallery.find(({ name }) => name === "study/undulation.toml"),
     sliders: [
       { key: MARGINS, low: 0, high: 50, log: false },
-      { key: "scale:stiffness.bending_2", low: 1, high: 100, log: true, words: "softness lost: harder to bend up and down, times" },
+      { key: "scale:stiffness.bending_2", low: 1, high: 100, log: true, words: "bending stiffness up and down, times that at first" },
       { key: "stiffness.torsion", low: 0.1, high: 10, log: true },
     ],
     lead: "A margin that has grown longer than the midrib does not fit beside it. It can bow outwards in the surface of the leaf, or bend up and down.",
@@ -84,7 +84,7 @@ const LESSONS = {
       const ratio = 0.01 * sliders.value("scale:stiffness.bending_2");
       const first = longer < 1 ? "The margins are as long as the midrib: nothing is too long." : `The margins are ${words(longer)} % longer than the midrib: too long to lie straight beside it.`;
       const soft = `Up and down they are ${ratio < 1 ? `${words(1 / ratio)} times softer than` : "as stiff as"} sideways`;
-      const now = known.waves > 0 ? `${soft}, so it costs less to ripple, ${words(known.waves)} L high, than to bow outwards.` : `${soft}, and here it costs less to take up the length by bowing outwards: there are no waves to count.`;
+      const now = known.waves > 0 ? `${soft}, so it costs less to ripple, ${words(known.waves)} of the length high, than to bow outwards.` : `${soft}, and here it costs less to take up the length by bowing outwards: there are no waves to count.`;
       const change = known.waves - before.waves;
       const then = before.waves > 0 && !known.waves ? "With the last step the waves vanished." : !before.waves && known.waves > 0 ? "With the last step waves appeared." : Math.abs(change) > 1e-3 ? `With the last step the waves became ${change > 0 ? "higher" : "lower"}.` : "";
       return [first, now, then];
@@ -92,13 +92,13 @@ const LESSONS = {
     picture: (svg) => drawPlane(svg),
   },
   snap: {
-    title: "Why does it snap?",
+    title: "Why does a bent strip snap?",
     scenario: () => ({ text: SNAP, name: "snap.toml" }),
     sliders: [
-      { key: "load.tip_force[2]", low: -0.5, high: 0.5, log: false, words: "push across, upwards" },
-      { key: "load.tip_force[0]", low: -4, high: -2, log: false, words: "push together (more to the left)" },
+      { key: "load.tip_force[2]", low: -0.5, high: 0.5, log: false, words: "push across (positive: upwards)" },
+      { key: "load.tip_force[0]", low: -4, high: -2, log: false, words: "push along (negative: together)" },
     ],
-    lead: "A strip that is pushed together bends to one side or to the other. Push it across, slowly, to the side where it is not.",
+    lead: "A strip that is pushed together bends to one side or to the other. Push its tip across, slowly, towards the other side: it leans, and then it jumps.",
     formula: "At rest the energy V(z) = W(z) − F z has no slope; stable is a valley. At the fold valley and hill meet, V″ = 0: beyond it nothing holds the leaf on its side. W(z) is the work against the force that would hold the tip at z: the area under the curve of force and displacement.",
     measure: "The force at which it jumps, once on the way there and once on the way back: the difference is the hysteresis, and the area between is the energy that a snap sets free.",
     chapter: "how-to-read.md",
@@ -119,7 +119,7 @@ const LESSONS = {
     sliders: [
       { key: "leaf.length", low: 5, high: 45, log: false },
       { key: THICKNESSES[0], low: 0.01, high: 0.08, log: true, words: "thickness at the base" },
-      { key: THICKNESSES[1], low: 0.005, high: 0.08, log: true, words: "thickness at the tip: it tapers" },
+      { key: THICKNESSES[1], low: 0.005, high: 0.08, log: true, words: "thickness at the tip" },
       { key: "section.width", low: 0.1, high: 1, log: true },
     ],
     keepMass() {
@@ -135,7 +135,7 @@ const LESSONS = {
       sliders.values.set("section.width", width);
       sliders.place("section.width");
     },
-    lead: "Its own weight bends it. Twice as long is twice the weight on twice the lever: what stood upright arches over, and hangs.",
+    lead: "Its own weight bends it: twice as long is twice the weight on twice the lever. But the farther it bends over, the nearer its weight comes to its base, and the shorter the lever: there its stiffness holds it. It arches, and does not fall.",
     formula: "Upright a blade of constant section stands up to the length L = (7.84 E I/(ρ g A))^⅓; of a flat section I/A = t²/12, so that L grows with t^⅔, and the width does not count. For the same mass a thicker, narrower blade stands longer, and so does one that tapers: its weight is low, and its stiffness where the moment is.",
     measure: "Its length, thickness and mass, and how often it nods in a second after a touch: the frequency tells E I without cutting it.",
     chapter: "how-to-read.md",
@@ -191,9 +191,10 @@ async function ask(name) {
 function tellLesson(known) {
   // Until its leaf is open, numbers are those of another one.
   if (!lesson || !known || !step.open) return;
-  // A step is a change of a slider; the same leaf, solved again, is none.
+  // A step is a change of a slider, from where it was taken to where it is let go; the same leaf, solved again, is none.
   const values = JSON.stringify([...sliders.values]);
-  if (values !== step.values) step = { open: true, before: step.known || known, values };
+  if (values !== step.values) step = { open: true, before: step.dragged ? step.before : step.known || known, values, dragged: Boolean(now.dragged) };
+  else if (!now.dragged) step.dragged = false;
   step.known = known;
   find("said").replaceChildren(...lesson.said(known, step.before || known).filter(Boolean).map((text) => Object.assign(document.createElement("span"), { textContent: `${text} ` })));
   if (lesson.picture) lesson.picture(find("lesson-picture"), known);
@@ -208,7 +209,9 @@ function part(svg, tag, attributes, text) {
   return element;
 }
 
-const PLANE = { left: 46, right: 330, top: 10, bottom: 176, x: [0.01, 1], y: [0.1, 10] };
+const PLANE = { left: 46, right: 330, top: 10, bottom: 176, x: [0.0075, 1.3], y: [0.075, 13] };
+/// How far the point is dragged: to numbers of the sliders.
+const WITHIN = { x: [0.01, 1], y: [0.1, 10] };
 
 /// The plane of softness and torsion: on which side of the curve the flat leaf ripples. A point is dragged, and the leaf follows.
 function drawPlane(svg) {
@@ -219,13 +222,15 @@ function drawPlane(svg) {
     svg.setAttribute("viewBox", "0 0 340 216");
     svg.setAttribute("aria-label", "where the flat leaf ripples: softness against stiffness against twisting");
     const curve = WAVES_BEGIN.map(([a, b]) => place(a, b).map((x) => x.toFixed(1)).join(","));
-    part(svg, "path", { d: `M${left} ${top}V${bottom}H${place(0.943, 0.1)[0]} L${curve.join(" L")}V${top}Z`, fill: "var(--membrane)", opacity: 0.35 });
+    part(svg, "path", { d: `M${left} ${top}V${bottom}H${place(...WAVES_BEGIN[0])[0]} L${curve.join(" L")}V${top}Z`, fill: "var(--membrane)", opacity: 0.35 });
     part(svg, "path", { d: `M${curve.join(" L")}`, fill: "none", stroke: "var(--ink)", "stroke-width": 1.6 });
     part(svg, "rect", { x: left, y: top, width: right - left, height: bottom - top, fill: "none", stroke: "var(--frame)" });
     for (const value of [0.01, 0.1, 1]) part(svg, "text", { x: place(value, 1)[0], y: bottom + 14, "text-anchor": "middle" }, value);
     for (const value of [0.1, 1, 10]) part(svg, "text", { x: left - 5, y: place(1, value)[1] + 4, "text-anchor": "end" }, value);
-    part(svg, "text", { x: (left + right) / 2, y: bottom + 31, "text-anchor": "middle" }, "stiffness up and down, of that sideways");
-    part(svg, "text", { x: 12, y: (top + bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(top + bottom) / 2})` }, "against twisting");
+    part(svg, "text", { x: (left + right) / 2, y: bottom + 31, "text-anchor": "middle" }, "bending stiffness: up and down ÷ sideways");
+    part(svg, "text", { x: 12, y: (top + bottom) / 2, "text-anchor": "middle", transform: `rotate(-90 12 ${(top + bottom) / 2})` }, "stiffness against twisting");
+    part(svg, "text", { x: left + 8, y: bottom - 8 }, "drag the point");
+    svg.style.touchAction = "none";
     part(svg, "text", { x: place(0.02, 1)[0], y: place(1, 0.45)[1] }, "ripples");
     part(svg, "text", { x: place(0.6, 1)[0], y: place(1, 4)[1], "text-anchor": "middle" }, "flat");
     svg.mark = part(svg, "circle", { r: 7, fill: "var(--accent)", stroke: "var(--paper)", "stroke-width": 1.5 });
@@ -233,17 +238,19 @@ function drawPlane(svg) {
       if (event.type === "pointermove" && !event.buttons) return;
       const box = svg.getBoundingClientRect();
       const at = [(340 * (event.clientX - box.left)) / box.width, (216 * (event.clientY - box.top)) / box.height];
-      const within = (value) => Math.min(1, Math.max(0, value));
-      const a = x[0] * (x[1] / x[0]) ** within((at[0] - left) / (right - left));
-      const b = y[0] * (y[1] / y[0]) ** within((bottom - at[1]) / (bottom - top));
+      const within = ([low, high], value) => Math.min(high, Math.max(low, value));
+      const a = within(WITHIN.x, x[0] * (x[1] / x[0]) ** ((at[0] - left) / (right - left)));
+      const b = within(WITHIN.y, y[0] * (y[1] / y[0]) ** ((bottom - at[1]) / (bottom - top)));
       sliders.values.set("stiffness.torsion", Number(b.toPrecision(3)));
       sliders.set("scale:stiffness.bending_2", Number((100 * a).toPrecision(3)), event.type === "pointerup");
       sliders.placeAll();
+      // The point is under the pointer, also where the leaf takes its time.
+      drawPlane(svg);
     };
     svg.onpointerdown = (event) => (svg.setPointerCapture(event.pointerId), go(event));
     svg.onpointermove = svg.onpointerup = go;
   }
-  const [cx, cy] = place(Math.min(1, Math.max(0.01, ratio)), Math.min(10, Math.max(0.1, torsion)));
+  const [cx, cy] = place(Math.min(x[1], Math.max(x[0], ratio)), Math.min(y[1], Math.max(y[0], torsion)));
   svg.mark.setAttribute("cx", cx);
   svg.mark.setAttribute("cy", cy);
 }
@@ -252,23 +259,33 @@ function drawPlane(svg) {
 function drawLandscape(svg, known) {
   const points = trail.key === "load.tip_force[2]" && trail.branch ? trail.branch.points : [];
   svg.replaceChildren();
+  svg.style.touchAction = "auto";
   svg.setAttribute("viewBox", "0 0 340 160");
   svg.setAttribute("aria-label", "energy over the height of the tip");
-  if (points.length < 3) return void part(svg, "text", { x: 170, y: 80, "text-anchor": "middle" }, "energy: move the push across");
+  if (points.length < 3) return void part(svg, "text", { x: 170, y: 80, "text-anchor": "middle" }, "the energy is drawn as soon as the branch is known");
   const force = sliders.value("load.tip_force[2]");
   let work = 0;
   const curve = points.map(({ value, tip }, i) => {
     if (i) work += 0.5 * (value + points[i - 1].value) * (tip[2] - points[i - 1].tip[2]);
-    return [tip[2], work - force * tip[2]];
+    // Its slope is the force that is missing: to hold the tip there it takes that of the branch.
+    return [tip[2], work - force * tip[2], value - force];
   });
   const [zs, es] = [0, 1].map((k) => curve.map((one) => one[k]));
   const [low, high] = [Math.min(...zs), Math.max(...zs)];
   const [deep, top] = [Math.min(...es), Math.max(...es)];
   const place = (z, e) => [20 + (300 * (z - low)) / (high - low || 1), 130 - (110 * (e - deep)) / (top - deep || 1)];
-  part(svg, "path", { d: `M${curve.map(([z, e]) => place(z, e).map((x) => x.toFixed(1)).join(",")).join(" L")}`, fill: "none", stroke: "var(--ink)", "stroke-width": 1.6 });
+  const at = (z, e) => place(z, e).map((x) => x.toFixed(1)).join(",");
+  const cubic = ([z, e, slope], i) => {
+    if (!i) return `M${at(z, e)}`;
+    const [from, height, before] = curve[i - 1];
+    const third = (z - from) / 3;
+    return `C${at(from + third, height + before * third)} ${at(z - third, e - slope * third)} ${at(z, e)}`;
+  };
+  part(svg, "path", { d: curve.map(cubic).join(" "), fill: "none", stroke: "var(--ink)", "stroke-width": 1.6 });
   const z = known.tips[0][2];
   const nearest = curve.reduce((best, one) => (Math.abs(one[0] - z) < Math.abs(best[0] - z) ? one : best));
   const [cx, cy] = place(z, nearest[1]);
   part(svg, "circle", { cx, cy: cy - 7, r: 7, fill: "var(--accent)" });
-  part(svg, "text", { x: 170, y: 150, "text-anchor": "middle" }, "over the height of the tip: the leaf lies in a valley");
+  part(svg, "text", { x: 170, y: 150, "text-anchor": "middle" }, "height of the tip: the strip rests in a valley");
+  part(svg, "text", { x: 10, y: 75, "text-anchor": "middle", transform: "rotate(-90 10 75)" }, "energy");
 }

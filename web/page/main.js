@@ -206,7 +206,8 @@ async function begin() {
   const given = JSON.parse(find("given").textContent);
   const shared = await unpacked(location.hash).catch(() => null);
   const opened = (shared && (await open(shared))) || (given && (await open(given)));
-  const question = questionOf(location.hash);
+  // Whoever comes without a wish is asked a question; `#all` begins with a leaf and all its numbers.
+  const question = questionOf(location.hash) || (opened || location.hash ? null : "ripple");
   if (question) await ask(question);
   else if (!opened) await open(gallery.find(({ name }) => name.includes("fig04")) || gallery[0]);
   listen();

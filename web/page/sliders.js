@@ -16,6 +16,8 @@ const valueOf = ({ low, high, log, whole }, part) => {
   return Number((Math.round(value / 10 ** unit) * 10 ** unit).toPrecision(12));
 };
 const rounded = (value) => Number(value.toPrecision(6));
+/// As a field for numbers shows it: small ones by their power of ten, whose digits fit into it.
+const written = (value) => (value !== 0 && Math.abs(value) < 1e-4 ? rounded(value).toExponential() : String(rounded(value)));
 
 /// The slider of all veins that have grown, which is none of a number of the scenario: by how much the margins are longer than the midrib.
 const MARGINS = "margins";
@@ -168,7 +170,7 @@ class Sliders {
     away.setAttribute("aria-label", `take the slider of ${key} away`);
     away.addEventListener("click", () => this.remove(key));
     const end = (name) => {
-      const input = make("input", { type: "number", step: "any", tabIndex: -1, value: slider[name] });
+      const input = make("input", { type: "number", step: "any", tabIndex: -1, value: written(slider[name]) });
       input.setAttribute("aria-label", `${name === "low" ? "lowest" : "highest"} ${key}`);
       input.addEventListener("change", () => this.range(slider, name, input));
       return input;
@@ -212,8 +214,8 @@ class Sliders {
     if (!slider || !slider.parts) return;
     const { number, range, ends } = slider.parts;
     const value = this.value(key);
-    for (const [name, input] of Object.entries(ends)) input.value = slider[name];
-    number.value = rounded(value);
+    for (const [name, input] of Object.entries(ends)) input.value = written(slider[name]);
+    number.value = written(value);
     range.value = STEPS * partOf(slider, value);
     range.setAttribute("aria-valuetext", String(rounded(value)));
     this.mark(slider);
@@ -267,11 +269,12 @@ class Sliders {
   }
 }
 
-const withItsUnit = (words, unit) => (unit ? `${words} / ${unit}` : words);
+/// A unit stays in one line with its stroke.
+const withItsUnit = (words, unit) => (unit ? `${words} /\u00a0${unit.replaceAll(" ", "\u00a0")}` : words);
 
 /// The slider of the growth of the margins, in per cent.
 function marginsSlider(value) {
-  return { key: MARGINS, words: "margins longer than the midrib by", unit: "%", value, low: 0, high: 2 * value, log: false, whole: false, effect: Infinity, description: "growth of the veins: the outermost by this part, those between as they are in the scenario" };
+  return { key: MARGINS, words: "margins longer than the midrib", unit: "%", value, low: 0, high: 2 * value, log: false, whole: false, effect: Infinity, description: "growth of the veins: the outermost by this part, those between as they are in the scenario" };
 }
 
 /// Lists have a number for each vein, and a factor of all, which tells more.

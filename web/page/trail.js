@@ -77,7 +77,8 @@ class Trail {
       curves.push({ ...curve("what comes", 7, points), special });
     }
     curves.push(curve("as it went", 0, this.points));
-    const chart = { across: this.key, log: this.log, choices: [this.names[this.choice]], curves };
+    const { words, unit } = sliders.shown.find(({ key }) => key === this.key) || { words: this.key };
+    const chart = { across: withItsUnit(words, unit), log: this.log, choices: [this.names[this.choice]], curves };
     if (this.diagram && this.diagram.stage === stage) {
       this.diagram.chart = chart;
       this.diagram.draw(0);

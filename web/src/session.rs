@@ -64,6 +64,8 @@ struct Open {
     follower: Option<EquilibriumTracker>,
     /// Whether that is on a coarse grid.
     coarse: bool,
+    /// Segments of the coarsest grid on which the leaf was relaxed to its tolerance, if it was on one.
+    relaxed_on: Option<usize>,
 }
 
 /// What a page has open.
@@ -204,6 +206,10 @@ fn follow_options(scenario: &Scenario, how: How) -> Options {
     }
 }
 
+/// Segments of the one grid for a leaf that cannot be followed, while a number is dragged: half of those that its tolerance
+/// asked for, and no fewer. (The ten coils of classic/helical_rollup.toml on 64 segments: the tip is off by 1e-3 of the length.)
+const LEAST_SEGMENTS: usize = 8;
+
 /// How far the tips of a leaf on a coarse grid are from those on finer ones at most, in lengths.
 const COARSE_DISTANCE: f64 = 0.05;
 
@@ -246,6 +252,7 @@ impl Open {
             base,
             values,
             scenario,
+            relaxed_on: leaf.accuracy.segments.first().copied(),
             leaf,
             follower,
             coarse: false,
@@ -330,8 +337,20 @@ impl Open {
             // These have no energy, and no branch of stable equilibria.
             && !scenario.has_moments();
         let Some(follower) = self.follower.as_mut().filter(|_| alike) else {
-            let (leaf, follower) =
-                EquilibriumTracker::begin(&scenario, &options(&scenario, how.modes))?;
+            let exact = options(&scenario, how.modes);
+            let half = |segments: usize| (segments / 2).max(LEAST_SEGMENTS);
+            let coarse = (how.coarse && scenario.has_moments()).then_some(self.relaxed_on);
+            let relaxed = match coarse.flatten().map(half) {
+                Some(segments) => Options {
+                    method: exact.method.on_grid(Some(segments)),
+                    ..exact
+                },
+                None => exact,
+            };
+            let (leaf, follower) = EquilibriumTracker::begin(&scenario, &relaxed)?;
+            if coarse.is_none() {
+                self.relaxed_on = leaf.accuracy.segments.first().copied();
+            }
             (self.leaf, self.follower) = (leaf, follower);
             (self.values, self.scenario) = (values, bare);
             return Ok(Answer::Found(self.known()));

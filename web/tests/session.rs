@@ -1,5 +1,6 @@
 //! What a page does with a leaf, without a page.
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use leafdyn_web::session::Session;
 use serde_json::{Value, json};
 use std::path::Path;
@@ -291,6 +292,59 @@ fn grown_margins_are_told() {
         (&growth["stretches"][0], &growth["stretches"][5]),
         (&json!(1.3), &json!(1.0))
     );
+}
+
+/// A leaf under a dead moment, which is relaxed anew for each value, is relaxed on one grid of half as many segments while a slider is
+/// dragged, and let go as accurately as before: the coarse one is never the measure of the next.
+#[test]
+fn a_dragged_leaf_under_a_moment_is_coarse_and_then_exact() {
+    let mut session = Session::default();
+    open(&mut session, "classic/helical_rollup.toml");
+    let set = |session: &mut Session, part: f64, coarse: bool| {
+        let values = json!([["stiffness.bending_3", 100.0 * part]]);
+        let leaf = ask(
+            session,
+            json!({ "ask": "set", "values": values, "coarse": coarse }),
+        );
+        assert_eq!(leaf["answer"], "found", "{part} {coarse}");
+        leaf
+    };
+    let tip = |leaf: &Value| [0, 1, 2].map(|axis| leaf["tips"][0][axis].as_f64().unwrap());
+    let segments = |leaf: &Value| leaf["view"]["leaves"][0]["nodes"].as_u64().unwrap() - 1;
+    for part in [1.02, 1.05, 1.08] {
+        let rough = [set(&mut session, part, true), set(&mut session, part, true)];
+        let exact = set(&mut session, part, false);
+        assert!(rough.iter().all(|leaf| leaf["error"].is_null()));
+        assert!(exact["error"].as_f64().unwrap() <= 1e-4 * 10.0);
+        assert_eq!(rough.each_ref().map(segments), [64, 64]);
+        let [a, b] = [tip(&rough[1]), tip(&exact)];
+        let apart = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| (a - b).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        assert!(apart < 0.02 * 10.0 && apart > 1e-4, "{apart} of 10");
+    }
+}
+
+/// A tip on a roller is drawn as one that slides, not as a free one.
+#[test]
+fn a_tip_on_a_roller_is_not_drawn_as_free() {
+    let mut session = Session::default();
+    let mut figure = |name: &str| {
+        open(&mut session, name);
+        let file = ask(
+            &mut session,
+            json!({ "ask": "write", "file": "figure.svg" }),
+        );
+        let content = BASE64_STANDARD.decode(file["content"].as_str().unwrap());
+        String::from_utf8(content.unwrap()).unwrap()
+    };
+    let roller = figure("classic/three_point_bending.toml");
+    assert!(roller.contains(">slides<") && !roller.contains(">free tip<"));
+    let free = figure("classic/cantilever_tip.toml");
+    assert!(!free.contains(">slides<") && free.contains(">free tip<"));
 }
 
 /// While a slider is dragged the leaf is that of a coarse grid; let go, it is as accurate as before. Where the coarse

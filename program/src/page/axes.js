@@ -1,6 +1,9 @@
 // The box around the leaf: axes with ticks, gravity and wind, captions and the colour scale, on the canvas below the leaf.
 const AXIS_NAMES = ["x", "y", "z"];
-const font = (px) => `${px}px system-ui, "DejaVu Sans", sans-serif`;
+/// On a projector everything is read from far away.
+const projected = matchMedia("(min-width: 1600px)");
+const enlarged = (px) => (projected.matches ? 1.3 * px : px);
+const font = (px) => `${enlarged(px)}px system-ui, "DejaVu Sans", sans-serif`;
 
 /// The box that holds all leaves, the base among them.
 function boxOf(leaves) {
@@ -54,6 +57,14 @@ function drawAxes(pen, box, place, small, named) {
   const size = small ? 10 : 12;
   pen.lineWidth = 1;
   floor(pen, box, place);
+  // Numbers of two axes that meet in a corner of the box are not written over one another.
+  const [taken, names] = [[], []];
+  const isFree = (x, y, wide) => {
+    const mine = [x - wide / 2 - 2, y - enlarged(size) / 2, x + wide / 2 + 2, y + enlarged(size) / 2];
+    const free = taken.every((other) => mine[0] > other[2] || mine[2] < other[0] || mine[1] > other[3] || mine[3] < other[1]);
+    if (free) taken.push(mine);
+    return free;
+  };
   for (const edge of edges(box, place)) {
     const { axis, from, p, q, mid } = edge;
     const way = [q[0] - p[0], q[1] - p[1]];
@@ -74,15 +85,25 @@ function drawAxes(pen, box, place, small, named) {
       const at = place(from.map((x, k) => (k === axis ? value : x)));
       line(pen, at, [at[0] + 5 * out[0], at[1] + 5 * out[1]]);
       const text = tickText(value, decimals, step);
-      widest = Math.max(widest, pen.measureText(text).width);
-      pen.fillText(text, at[0] + 9 * out[0], at[1] + (out[1] > 0.5 ? 13 : out[1] < -0.5 ? -13 : 9 * out[1]));
+      const breadth = pen.measureText(text).width;
+      const [x, y] = [at[0] + 9 * out[0], at[1] + (out[1] > 0.5 ? 13 : out[1] < -0.5 ? -13 : 9 * out[1])];
+      const middle = x + ({ left: 0.5, right: -0.5 }[pen.textAlign] || 0) * breadth;
+      if (!isFree(middle, y, breadth)) continue;
+      widest = Math.max(widest, breadth);
+      pen.fillText(text, x, y);
     }
-    pen.fillStyle = css("--ink");
-    pen.font = font(size + 1);
-    if (!named) continue;
     const away = Math.abs(out[0]) > 0.5 ? 20 + widest : small ? 27 : 32;
-    const name = withUnit(AXIS_NAMES[axis], lengthUnit);
-    pen.fillText(name, (p[0] + q[0]) / 2 + away * out[0], (p[1] + q[1]) / 2 + away * out[1]);
+    names.push({ name: withUnit(AXIS_NAMES[axis], lengthUnit), align: pen.textAlign, at: [(p[0] + q[0]) / 2 + away * out[0], (p[1] + q[1]) / 2 + away * out[1]], out });
+  }
+  pen.fillStyle = css("--ink");
+  pen.font = font(size + 1);
+  for (const { name, align, at, out } of named ? names : []) {
+    pen.textAlign = align;
+    const breadth = pen.measureText(name).width;
+    const middle = ({ left: 0.5, right: -0.5 }[align] || 0) * breadth;
+    // Farther out, where numbers stand in its place.
+    const [x, y] = [0, 8, 16, 24].map((k) => [at[0] + k * out[0], at[1] + k * out[1]]).find(([x, y]) => isFree(x + middle, y, breadth)) || at;
+    pen.fillText(name, x, y);
   }
 }
 

@@ -119,16 +119,16 @@ impl PageResult for Record {
         let units = &scenario.units;
         view.kind = "motion";
         view.verdict = match self.stopped {
-            None => format!("followed to t = {}", format_four_digits(self.time)),
+            None => format!("followed to {}", instant_text(self.time, units)),
             Some(_) => {
-                let (time, outcome) = (format_four_digits(self.time), self.outcome());
-                format!("ended early at t = {time}: {outcome}")
+                let (instant, outcome) = (instant_text(self.time, units), self.outcome());
+                format!("ended early at {instant}: {outcome}")
             }
         };
         view.success = self.stopped.is_none();
         let shapes = self.film.iter().map(|still| {
             let time = self.moments[still.moment].time;
-            let (label, curves) = (format!("t = {}", format_four_digits(time)), &still.curves);
+            let (label, curves) = (instant_text(time, units), &still.curves);
             PageLeaf {
                 time: Some(time),
                 ..PageLeaf::from_centerlines(
@@ -142,6 +142,15 @@ impl PageResult for Record {
         });
         view.leaves = shapes.collect();
         view.chart = Some(motion_chart(&self.moments, units));
+    }
+}
+
+/// An instant in the scenario's unit of time, if it names one.
+fn instant_text(time: f64, units: &Units) -> String {
+    let number = format_four_digits(time);
+    match &units.time {
+        Some(unit) => format!("t = {number} {unit}"),
+        None => format!("t = {number}"),
     }
 }
 
@@ -180,7 +189,7 @@ fn motion_chart(moments: &[OutputSample], units: &Units) -> PageChart {
         None => "tip",
     };
     PageChart {
-        across: "time".into(),
+        across: name_with_unit("time", units.time.as_deref()),
         log: false,
         choices: vec![
             name_with_unit("energy", units.energy().as_deref()),

@@ -131,7 +131,7 @@ class LeafMesh {
     const last = (j) => 3 * (j * this.fine + this.fine - 1);
     this.tips.forEach((tip, j) => tip.position.fromArray(this.points, last(j)));
     // A tip that is held has the mark of its holder.
-    this.tips.forEach((tip) => (tip.visible = !view.holds.some(({ part }) => part === "tip")));
+    this.tips.forEach((tip, j) => (tip.visible = !view.holds.some((hold) => holdsTip(hold, j))));
     this.holds.forEach(({ mark, place }) => mark.position.fromArray(this.points, place));
     this.bars.forEach(({ mark, places }) => layBetween(mark, places.map((place) => new THREE.Vector3().fromArray(this.points, place))));
     this.load(leaf);
@@ -201,6 +201,9 @@ class LeafMesh {
     this.surface.material.color.set(css("--membrane"));
   }
 }
+
+/// Whether what holds a leaf is at this one of its tips: the joined one, or that of a vein that is drawn.
+const holdsTip = ({ part, vein, at }, j) => part === "tip" || (part === "grip" && at[1] === 1 && (view.rods === 1 || (!view.joined && vein === view.drawn[j])));
 
 /// Where a mark at a fraction of a vein lies among the points of a mesh; less than zero: the vein is not drawn.
 const placeOf = (vein, at, { stations }, mesh) => 3 * (view.drawn.indexOf(vein) * mesh.fine + mesh.fineAt(stations, at));

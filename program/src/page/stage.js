@@ -176,7 +176,7 @@ function frustum(width, height) {
   const { camera, fit } = space;
   const small = space.panels.length > 1;
   // A title stands above a small panel, names of axes below the box of a large one.
-  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 76, 70] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
+  const [marginX, above, below] = small ? [34, 42, 36] : height < 420 ? [60, 76, 84] : find("axes").checked ? [90, 66, 110] : [40, 50, 50];
   const scale = Math.min(Math.max(40, width - 2 * marginX) / fit[0], Math.max(40, height - above - below) / fit[1]);
   camera.right = width / 2 / scale;
   camera.left = -camera.right;
@@ -257,7 +257,7 @@ function drawLabel(pen, panel, small) {
   const [first, second] = pen.measureText(panel.label).width > width - 12 ? twoLines(panel.label) : [panel.label, ""];
   const y = top + (small ? 4 : 46);
   pen.fillText(first, left + width / 2, y, width - 12);
-  pen.fillText(second, left + width / 2, y + 15, width - 12);
+  pen.fillText(second, left + width / 2, y + enlarged(15), width - 12);
 }
 
 /// A text divided at the comma or the space nearest to its middle.

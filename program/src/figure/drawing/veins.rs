@@ -209,9 +209,15 @@ impl DrawnVeins {
             let mut of_part = marks.iter().filter(move |mark| mark.part == part);
             of_part.next().map(|mark| mark.held)
         };
+        // The tip of the only vein may be held by a grip at its end: a roller, a spring.
+        let grip_at_tip = || {
+            let mut grips = marks.iter().filter(|mark| mark.part == ParsedKey::Grip);
+            let at_end = grips.find(|mark| scenario.rods.len() == 1 && mark.at[1] == 1.0);
+            at_end.map(|mark| mark.held)
+        };
         DrawnVeins {
             base_support: held(ParsedKey::Base).unwrap_or(self.base_support),
-            tip_support: held(ParsedKey::Tip),
+            tip_support: held(ParsedKey::Tip).or_else(grip_at_tip),
             ..self
         }
     }
