@@ -39,15 +39,10 @@ impl<'a> Natural<'a> {
     /// The natural leaf of a scenario, whose veins have `grown`, or not yet: that in which holders and
     /// tissue have their places.
     pub fn new(scenario: &'a Scenario, grown: bool) -> Self {
-        Natural::of_rest_shapes(scenario.natural.as_deref().unwrap_or(scenario), grown)
-    }
-
-    /// The veins in the rest shapes that they have now.
-    pub fn at_rest(scenario: &'a Scenario) -> Self {
-        Natural::of_rest_shapes(scenario, true)
-    }
-
-    fn of_rest_shapes(scenario: &'a Scenario, grown: bool) -> Self {
+        let scenario = scenario
+            .natural
+            .as_ref()
+            .map_or(scenario, |it| &*it.scenario);
         let veins = (0..scenario.rods.len()).map(|j| integrate_vein(scenario, j, grown));
         Natural {
             veins: veins.collect(),

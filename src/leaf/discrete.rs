@@ -190,8 +190,9 @@ impl DiscreteLeaf {
         let is_held = !scenario.grips.is_empty() || scenario.foundation.is_some();
         if makes_strips || is_held || leaf.has_base_springs() {
             // Holders and tissue have their places in the natural leaf, whatever the rest shapes are now.
-            let original = (scenario.natural.as_deref())
-                .map(|natural| DiscreteLeaf::new(&Leaf::new(natural), discrete.grid.clone()));
+            let original = (scenario.natural.as_ref()).map(|natural| {
+                DiscreteLeaf::new(&Leaf::new(&natural.scenario), discrete.grid.clone())
+            });
             let unstrained = |grown: bool| {
                 original
                     .as_ref()
@@ -714,7 +715,9 @@ impl Leaf {
         if !self.has_tissue() {
             return;
         }
-        let natural = Natural::at_rest(self.scenario());
+        let natural = Natural::new(self.scenario(), true);
+        // As a motion changes them: with the chords of the natural leaf.
+        let factor = (self.scenario().natural.as_ref()).map_or(1.0, |it| it.factor);
         for (j, sections) in sections.chunks_mut(grid.segments()).enumerate() {
             if self.is_straight_at_rest(j) {
                 continue;
@@ -725,7 +728,7 @@ impl Leaf {
                 let chord = (next.position - before.position) / (self.scale.length * section.ds);
                 let [from, to] = [before, next].map(|pose| pose.rotation);
                 section.rest_strain = rotation::midpoint(from, to).inverse() * chord;
-                section.rest_curvature = rotation::log(from.conjugate() * to) / section.ds;
+                section.rest_curvature = factor * rotation::log(from.conjugate() * to) / section.ds;
                 before = next;
             }
         }

@@ -92,14 +92,22 @@ pub struct Scenario {
     pub photo: Option<Photo>,
     /// Wanted accuracy of the centerlines, relative to the largest rod length.
     pub tolerance: f64,
-    /// The scenario whose rest shapes give the natural leaf, in which holders and tissue have their places, if those
-    /// of the veins have changed since.
-    pub(crate) natural: Option<Arc<Scenario>>,
+    /// The natural leaf, if the rest shapes of the veins have changed since.
+    pub natural: Option<NaturalShapes>,
     /// Largest shift, as a fraction of the length, of a place along the veins that is read as one with others.
     pub place_shift: f64,
     /// How the leaf moves; equilibria do not depend on it, but for the density if [`Scenario::g`]
     /// pulls it.
     pub dynamics: Dynamics,
+}
+
+/// The rest shapes of the natural leaf, in which holders and tissue have their places.
+#[derive(Clone, Debug, PartialEq)]
+pub struct NaturalShapes {
+    /// The scenario with these rest shapes.
+    pub scenario: Arc<Scenario>,
+    /// By which factor all rest curvatures have changed since.
+    pub factor: f64,
 }
 
 impl Scenario {

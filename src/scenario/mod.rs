@@ -32,8 +32,8 @@ crate::renamed! {
 }
 
 pub use crate::scenario::blade::Blade;
-pub use crate::scenario::checked::Scenario;
 pub(crate) use crate::scenario::checked::distinct_places;
+pub use crate::scenario::checked::{NaturalShapes, Scenario};
 pub use crate::scenario::format::Key;
 pub use crate::scenario::format::entries::Entries;
 pub use crate::scenario::format::error::{ScenarioError, SourceLocation, printable};

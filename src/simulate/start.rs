@@ -10,7 +10,7 @@ use crate::newton::{NewtonIteration, SolverCounts};
 use crate::relax;
 use crate::relax::{INDEFINITE_NEWTON_EQUATIONS, converge_saddle};
 use crate::run::Limit;
-use crate::scenario::{MotionStart, Scenario, Schedule};
+use crate::scenario::{MotionStart, NaturalShapes, Scenario, Schedule};
 use crate::simulate::remark::MotionDoubt;
 use crate::simulate::request::SimulationError;
 use std::f64::consts::PI;
@@ -110,7 +110,11 @@ pub(super) fn scenario_at_start(scenario: &Scenario) -> Scenario {
         (wind, _) => *wind = None,
     }
     if factor != 1.0 {
-        scenario.natural = Some(Arc::new(scenario.clone()));
+        let natural = Arc::new(scenario.clone());
+        scenario.natural = Some(NaturalShapes {
+            scenario: natural,
+            factor,
+        });
     }
     let rods = scenario.rods.iter_mut();
     for curvature in rods.flat_map(|rod| &mut rod.rest_curvature) {

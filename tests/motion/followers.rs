@@ -84,6 +84,38 @@ fn their_work_is_in_the_balance_of_energy() {
     }
 }
 
+/// Also the work on a base that moves, whose support carries these loads.
+#[test]
+fn their_work_on_a_base_that_moves_is_in_the_balance_of_energy() {
+    for load in [
+        "follower = [0.3, 0.5, -1.0]",
+        "couple = [0.2, -1.0, 0.3]",
+        "couple = [0.2, -1.0, 0.3], couple_follows = true",
+    ] {
+        let scenario = parse(&format!(
+            "name = 'carried'\nleaf = {{ rods = 1, length = 1.0, fan = [0.0] }}\n\
+             stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1000.0, shear_2 = 1000.0, shear_3 = 1000.0 }}\n\
+             load = {{ {load} }}\n\
+             [dynamics]\ndensity = 1.0\nexternal_damping = 0.0\nduration = 0.5\n\
+             base = {{ at = [0.0, 0.25, 0.5], move = [[0, 0, 0], [0.1, 0, 0.05], [0.1, 0, 0.2]], \
+             turn = [[0, 0, 0], [0, -0.25, 0], [0.2, -0.5, 0]], smooth = true }}"
+        ));
+        let leaf = Leaf::new(&scenario);
+        for scheme in BOTH {
+            let mut method = method(scheme, &leaf, &released(&leaf, 8), 2e-4);
+            let start = method.snapshot().energy.balance();
+            method.advance(0.5).unwrap();
+            let energy = method.snapshot().energy;
+            let off = (energy.balance() - start).abs();
+            assert!(energy.work.abs() > 0.1, "{load}, {scheme:?}: {energy:?}");
+            assert!(
+                off < 1e-4 * energy.work.abs(),
+                "{load}, {scheme:?}: {off:.1e}"
+            );
+        }
+    }
+}
+
 const ONE: &str = "{ at = [0.0, 1.0], factor = [1.0, 1.0] }";
 const PULSE: &str = "{ at = [0.0, 0.3, 0.6, 1.0], factor = [0.0, 1.0, -0.4, 0.7] }";
 

@@ -1,6 +1,6 @@
 //! Masses that land on a leaf in motion: the modes of a beam with a mass, momentum and energy, and both methods alike.
 
-use leafdyn::internals::motion::Physics;
+use leafdyn::internals::motion::{Physics, StepControl, TimeIntegrator};
 use leafdyn::scenario::{Landing, PointLoad};
 use leafdyn_testing::motion::*;
 use leafdyn_testing::{DVec3, Leaf, PI, Scenario};
@@ -405,4 +405,31 @@ fn masses_that_make_no_sense_are_refused() {
             .to_string();
         assert!(refused.contains(why), "{set}: {refused}");
     }
+}
+
+/// What internal friction dissipates as velocities jump is the work of its stresses on the strains: of a drop on a leaf
+/// of a material that creeps the energy is balanced, also in steps that are longer than the friction takes.
+#[test]
+fn friction_after_a_landing_is_in_the_balance_of_energy() {
+    let mut scenario = beam(1e-3, [1e4; 2]);
+    scenario.dynamics.internal_damping = 1e-3;
+    scenario.dynamics.external_damping = 0.5;
+    land(
+        &mut scenario,
+        (0, 0.6),
+        Landing {
+            mass: 0.05,
+            from: 0.1,
+            velocity: [0.0, 0.0, -0.5],
+        },
+    );
+    let leaf = Leaf::new(&scenario);
+    let off = [1e-5, 1e-6, 1e-7].map(|error| {
+        let mut moving = semi_implicit(&leaf, &released(&leaf, 16), StepControl::LocalError(error));
+        let start = moving.snapshot().energy.balance();
+        moving.advance(1.0).unwrap();
+        let energy = moving.snapshot().energy;
+        (energy.balance() - start).abs() / energy.dissipated
+    });
+    assert!(off[0] < 0.2 && off[1] < 0.05 && off[2] < 0.01, "{off:?}");
 }

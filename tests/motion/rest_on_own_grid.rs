@@ -50,6 +50,42 @@ fn wound_rods_stay_at_rest() {
     }
 }
 
+/// Holders and tissue stay in the places of the natural leaf where rest curvatures begin with a factor: what starts
+/// at rest there stays, as that factor is the only one.
+#[test]
+fn holders_stay_in_their_places_under_a_factor_of_the_rest_shape() {
+    let made = |rods: &str, holders: &str| {
+        parse(&format!(
+            "name = 'held'\nleaf = {{ {rods}, length = 1.0, joined = false }}\n\
+             stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1000.0, shear_2 = 1000.0, shear_3 = 1000.0 }}\n\
+             rest = {{ bend_2 = 0.6, twist = 0.3 }}\n\
+             dynamics = {{ start = \"at-rest\", duration = 0.5, output_interval = 0.25, rest = {{ at = [0.0, 0.5], factor = [1.4, 1.4] }} }}\n{holders}"
+        ))
+    };
+    let (one, two) = ("rods = 1, fan = [0.0]", "rods = 2, fan = [-0.2, 0.2]");
+    for (rods, holders) in [
+        (
+            one,
+            "grip = [{ vein = 1, at = 0.5, stiffness = [50.0, 50.0, 50.0] }]",
+        ),
+        (one, "grip = [{ vein = 1, at = 0.5 }]"),
+        (one, "grip = [{ vein = 1, at = 0.5, held = \"clamped\" }]"),
+        (one, "foundation = { stiffness = [20.0, 20.0, 20.0] }"),
+        (
+            two,
+            "tissue = { across = 10.0, along = 5.0, normal = 20.0, fold = 0.3 }",
+        ),
+        (
+            two,
+            "tissue = { across = 10.0, along = inf, normal = inf, fold = 0.3 }",
+        ),
+    ] {
+        let leaf = made(rods, holders);
+        let (way, _) = moves(&leaf, &moving(Scheme::SemiImplicit, Some(16))).unwrap();
+        assert!(way < 1e-8, "{holders}: {way:.1e}");
+    }
+}
+
 /// A rod that is pushed together between holders rests on finer grids alone: it moves on one of them, and on a coarse
 /// one that is asked for it is refused with what to do.
 #[test]

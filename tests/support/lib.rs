@@ -314,6 +314,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         support_motion: None,
         wind: None,
         photo: None,
+        natural: None,
         tolerance: 1e-6,
         place_shift: 0.0,
     }
