@@ -114,11 +114,13 @@ pub fn solve_minimal_residual(
         |r, c| if r <= c { triangle[c][r] } else { 0.0 },
     );
     let right = DVector::from_column_slice(&remaining[..count]);
-    let coefficients = upper
-        .clone()
-        .svd(true, true)
-        .solve(&right, limits.singular_value_limit)
-        .ok()?;
+    let coefficients = match limits.singular_value_limit > 0.0 {
+        true => (upper.clone().svd(true, true))
+            .solve(&right, limits.singular_value_limit)
+            .ok()?,
+        // Of a triangle next to the identity that decomposition may be accurate to ten digits only.
+        false => upper.solve_upper_triangular(&right)?,
+    };
     let left_out = (&right - upper * &coefficients).norm();
     found.residual = remaining[count].hypot(left_out) / length;
     found.coefficients = coefficients.iter().copied().collect();

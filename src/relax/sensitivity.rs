@@ -10,7 +10,7 @@ use crate::leaf::{
 use crate::modes::Eigenpair;
 use crate::modes::motion_pairs::MotionPair;
 use crate::motion::Physics;
-use crate::relax::accuracy::richardson::{Extrapolated, Richardson};
+use crate::relax::accuracy::richardson::{BestColumn, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
 use crate::relax::linear_response::Linearized;
 use crate::relax::plan::UNKNOWNS;
@@ -63,15 +63,14 @@ impl ResultDerivatives<VectorSeries> {
         self.grips.push(segments, on_grid.grips);
     }
 
-    /// The derivatives, with error bounds; on every grid they have errors of this size.
-    fn extrapolated(&self, noise: Noise) -> ResultDerivatives<Extrapolated<Vec<DVec3>>> {
+    fn extrapolated(&self, tolerance: f64) -> ResultDerivatives<Extrapolated<Vec<DVec3>>> {
         ResultDerivatives {
-            tips: self.tips.extrapolated(noise, BAR.least_ratio),
-            energy: self.energy.extrapolated(noise, BAR.least_energy_ratio),
-            eigenvalues: self.eigenvalues.extrapolated_one_by_one(noise.tolerance),
-            reaction: self.reaction.extrapolated_carefully(noise.tolerance),
-            positions: self.positions.extrapolated(noise, BAR.least_ratio),
-            grips: self.grips.extrapolated_carefully(noise.tolerance),
+            tips: self.tips.extrapolated(tolerance),
+            energy: self.energy.extrapolated(tolerance),
+            eigenvalues: self.eigenvalues.extrapolated(tolerance),
+            reaction: self.reaction.extrapolated(tolerance),
+            positions: self.positions.extrapolated(tolerance),
+            grips: self.grips.extrapolated(tolerance),
         }
     }
 }
@@ -140,15 +139,10 @@ pub(crate) fn sensitivities(
         }
     }
     let stations = coarsest.leaf.grid.sigma();
-    let squared = eigenvalues.extrapolated_carefully(tolerance).value;
-    let noise = Noise {
-        tolerance,
-        rounding: BAR.rounding + BAR.rounding_part * finest.leaf.eigenvalue_rounding(),
-        has_tissue: leaf.has_tissue(),
-    };
+    let squared = eigenvalues.extrapolated(tolerance).value;
     (known.iter().zip(found))
         .map(|(number, series)| {
-            let derivatives = series.extrapolated(noise);
+            let derivatives = series.extrapolated(tolerance);
             sensitivity(number, leaf, stations, derivatives, &squared)
         })
         .collect()
@@ -720,44 +714,20 @@ fn displace_along_response(
 
 /// What the error bar of a derivative is made from.
 struct DerivativeBar {
-    /// Safety factor on the last correction times the ratio of the last two, and the least such ratio of places and
-    /// of energies: of 240 derivatives of tips and energies of 40 random leaves by three numbers, 2 % of the errors
-    /// were larger, and half were less than a thirteenth of it.
-    series: f64,
-    least_ratio: f64,
-    least_energy_ratio: f64,
-    /// Safety factor on the error by extrapolation of derivatives that decrease less regularly than those of
-    /// positions: those of forces and eigenvalues, some of which are differences, and those of leaves with tissue.
+    /// Safety factor on the error by extrapolation: errors of derivatives decrease less regularly
+    /// than those of positions.
     safety: f64,
-    /// Relative error by rounding, and the part of the rounding error of the eigenvalues of the matrix that is one of
-    /// the soft directions, whose own eigenvalues are some ten.
+    /// Relative error by rounding.
     rounding: f64,
-    rounding_part: f64,
-    /// Relative error by unfinished iterations, as a part of the tolerance: twice as large, and for the derivatives
-    /// with the larger safety factor.
+    /// Relative error by unfinished iterations, as a part of the tolerance.
     iterations: f64,
-    careful_iterations: f64,
 }
 
 const BAR: DerivativeBar = DerivativeBar {
-    series: 20.0,
-    least_ratio: 1.0 / 64.0,
-    least_energy_ratio: 1.0 / 100.0,
     safety: 3.0,
     rounding: 1e-10,
-    rounding_part: 1e-2,
-    iterations: 0.05,
-    careful_iterations: 0.1,
+    iterations: 0.1,
 };
-
-/// Errors of derivatives on single grids.
-#[derive(Clone, Copy)]
-struct Noise {
-    tolerance: f64,
-    /// Relative, by rounding.
-    rounding: f64,
-    has_tissue: bool,
-}
 
 /// Values on successively refined grids, extrapolated together.
 #[derive(Default)]
@@ -780,49 +750,8 @@ impl VectorSeries {
         }
     }
 
-    /// The extrapolated values, with a common error bound: what the series leaves, whose corrections have this ratio
-    /// at least, and what there is on each grid.
-    fn extrapolated(&self, noise: Noise, least_ratio: f64) -> Extrapolated<Vec<DVec3>> {
-        if noise.has_tissue {
-            return self.extrapolated_carefully(noise.tolerance);
-        }
-        let on_grids = noise.rounding + BAR.iterations * noise.tolerance;
-        self.extrapolated_with(|table| {
-            Some(table.error_by_ratio(BAR.series, least_ratio)?.error + on_grids)
-        })
-    }
-
-    /// The extrapolated values, with a common error bound that holds where they decrease less regularly from
-    /// grid to grid.
-    fn extrapolated_carefully(&self, tolerance: f64) -> Extrapolated<Vec<DVec3>> {
-        let on_grids = BAR.rounding + BAR.careful_iterations * tolerance;
-        self.extrapolated_with(|table| Some(BAR.safety * table.best()?.error + on_grids))
-    }
-
-    /// Each value extrapolated by itself, as one may converge less regularly than the others; with the error bound
-    /// of the first.
-    fn extrapolated_one_by_one(&self, tolerance: f64) -> Extrapolated<Vec<DVec3>> {
-        let count = self.0.last().map_or(0, |grid| grid.values.len());
-        let one = |k: usize| {
-            let on_grid = |grid: &GridVectors| GridVectors {
-                segments: grid.segments,
-                values: vec![grid.values[k]],
-            };
-            let alone = VectorSeries(self.0.iter().map(on_grid).collect());
-            alone.extrapolated_carefully(tolerance)
-        };
-        let each: Vec<_> = (0..count).map(one).collect();
-        Extrapolated {
-            error: each.first().and_then(|first| first.error),
-            value: each.into_iter().flat_map(|it| it.value).collect(),
-        }
-    }
-
-    /// The extrapolated values, with the error relative to the largest of them that their table tells.
-    fn extrapolated_with(
-        &self,
-        error: impl Fn(&Richardson) -> Option<f64>,
-    ) -> Extrapolated<Vec<DVec3>> {
+    /// The extrapolated values, with a common error bound.
+    fn extrapolated(&self, tolerance: f64) -> Extrapolated<Vec<DVec3>> {
         let all = self.0.iter().flat_map(|grid| &grid.values);
         let unit = all.fold(0.0_f64, |m, v| m.max(v.abs().max_element()));
         let count = self.0.last().map_or(0, |grid| grid.values.len());
@@ -838,9 +767,12 @@ impl VectorSeries {
         };
         let table: Richardson = self.0.iter().map(on).collect();
         let values = table.extrapolated().chunks(3);
+        let error = |best: BestColumn| {
+            (BAR.safety * best.error + BAR.rounding + BAR.iterations * tolerance) * unit
+        };
         Extrapolated {
             value: values.map(|v| DVec3::from_slice(v) * unit).collect(),
-            error: error(&table).map(|error| error * unit),
+            error: table.best().map(error),
         }
     }
 }

@@ -200,21 +200,6 @@ impl Richardson {
         Some(BestColumn { error, ..best })
     }
 
-    /// The error of the best column by the ratio of its last two corrections, with this safety factor and the least
-    /// ratio. Of a clean series the correction by one more column would be to the last one as that is to the one
-    /// before it: it is about the error that remains.
-    pub fn error_by_ratio(&self, safety: f64, least_ratio: f64) -> Option<BestColumn> {
-        let best = self.best()?;
-        let last = self.table.len() - 1;
-        if best.columns < last || last < 2 {
-            return Some(best);
-        }
-        let ratio = self.correction(last) / self.correction(last - 1).max(ROUNDING);
-        let part = (safety * ratio.max(least_ratio)).min(SAFETY.most);
-        let error = larger(0.0, part * self.correction(last));
-        Some(BestColumn { error, ..best })
-    }
-
     /// The largest of the corrections on the finest grid by the first so many `columns`, of each
     /// this `part` for every column after it.
     pub fn largest_correction(&self, columns: usize, part: f64) -> f64 {
