@@ -619,13 +619,16 @@ mod tests {
     #[test]
     fn gravity_in_another_unit_is_doubted() {
         let doubts = |length: &str, g: f64| {
-            // That of water.
-            let density = if length == "cm" { 1e-5 } else { 1e3 };
+            // The density of water, and 1 GPa.
+            let (density, young) = match length {
+                "cm" => (1e-5, 1e5),
+                _ => (1e3, 1e9),
+            };
             let text = format!(
                 r#"
                 units = {{ length = "{length}", force = "N", time = "s" }}
                 leaf = {{ rods = 1, length = 3.0, fan = [0.0] }}
-                section = {{ shape = "circle", diameter = 0.2, young = 1e5, mass_density = {density} }}
+                section = {{ shape = "circle", diameter = 0.2, young = {young}, mass_density = {density} }}
                 load = {{ g = [0.0, 0.0, -{g}] }}"#
             );
             plausibility_warnings(&Scenario::from_toml(&text).unwrap())
