@@ -245,7 +245,7 @@ fn what_cannot_be_used_is_refused_with_what_to_do() {
     let run =
         "unbend leaf.toml --shape mm.csv --column x=x:0.1 --column z=z:0.1 --json --write none";
     assert!(least(&place.run(run).ends(0).json()) > 0.0);
-    place.write("short.csv", "x,z\n0,0\n1,1\n2,2\n");
+    place.write("short.csv", "x,z\n0,0\n8,8\n16,16\n");
     refused("leaf.toml --shape short.csv", &["3 points", "at least 6"]);
     place.write("words.csv", "a,b\n0,0\n");
     refused(
