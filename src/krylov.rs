@@ -2,7 +2,7 @@
 //! Comput. 7, 1986) for equations A x = b whose matrix is close to the identity but for few
 //! directions, as preconditioned ones are: A is known by its products.
 
-use nalgebra::{DMatrix, DVector};
+use faer::Mat;
 
 /// When [`solve_minimal_residual`] ends, and which directions it leaves out.
 #[derive(Clone, Copy, Debug)]
@@ -108,24 +108,38 @@ pub fn solve_minimal_residual(
         found.coefficients = vec![0.0; found.directions.len()];
         return Some(found);
     }
-    let upper = DMatrix::from_fn(
+    let upper = Mat::from_fn(
         count,
         count,
         |r, c| if r <= c { triangle[c][r] } else { 0.0 },
     );
-    let right = DVector::from_column_slice(&remaining[..count]);
-    let coefficients = match limits.singular_value_limit > 0.0 {
-        true => (upper.clone().svd(true, true))
-            .solve(&right, limits.singular_value_limit)
-            .ok()?,
-        // Of a triangle next to the identity that decomposition may be accurate to ten digits only.
-        false => upper.solve_upper_triangular(&right)?,
-    };
-    let left_out = (&right - upper * &coefficients).norm();
-    found.residual = remaining[count].hypot(left_out) / length;
-    found.coefficients = coefficients.iter().copied().collect();
+    let coefficients = solve_triangle(&upper, &remaining[..count], limits.singular_value_limit)?;
+    let sums = (0..count).map(|r| {
+        (r..count)
+            .map(|c| upper[(r, c)] * coefficients[c])
+            .sum::<f64>()
+    });
+    let left_out: Vec<f64> = remaining.iter().zip(sums).map(|(b, sum)| b - sum).collect();
+    found.residual = remaining[count].hypot(norm(&left_out)) / length;
+    found.coefficients = coefficients;
     found.coefficients.resize(found.directions.len(), 0.0);
     Some(found)
+}
+
+/// Solves a small system of equations, but for directions of a singular value up to `limit`. The singular values of nalgebra
+/// are accurate to ten digits only where a triangle is next to the identity.
+fn solve_triangle(upper: &Mat<f64>, right: &[f64], limit: f64) -> Option<Vec<f64>> {
+    let svd = upper.svd().ok()?;
+    let (left, values, directions) = (svd.U(), svd.S().column_vector(), svd.V());
+    let count = right.len();
+    let mut solution = vec![0.0; count];
+    for k in (0..count).filter(|&k| values[k] > limit) {
+        let part = (0..count).map(|r| left[(r, k)] * right[r]).sum::<f64>() / values[k];
+        for (r, sum) in solution.iter_mut().enumerate() {
+            *sum += part * directions[(r, k)];
+        }
+    }
+    Some(solution)
 }
 
 impl KrylovSolution {

@@ -82,6 +82,23 @@ fn rods_under_loads_that_follow_are_confirmed() {
     }
 }
 
+/// A round vein, whose energy does not tell how it is turned about its base: each of these loads has one equilibrium, as an
+/// initial value problem from the free tip shows.
+#[test]
+fn round_rods_under_loads_that_follow_come_to_rest() {
+    for size in [1.5, 1.6, 1.65, 1.7, 1.75, 1.8, 2.0] {
+        let [x, y, z] = [0.1, 0.3, -1.0].map(|part| size * part);
+        let scenario = parse(&format!(
+            r#"
+            name = "round"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+            stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = 1000.0, shear_2 = 1000.0, shear_3 = 1000.0 }}
+            load = {{ follower = [{x}, {y}, {z}] }}"#
+        ));
+        confirmed(&format!("round, {size}"), &scenario, 1e-8);
+    }
+}
+
 /// A moment that turns with the tip bends a rod to an arc: by shooting to its digits.
 #[test]
 fn a_moment_that_follows_bends_to_a_circle() {
