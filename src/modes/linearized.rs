@@ -288,8 +288,8 @@ impl<'a> LinearizedMotion<'a> {
         Some((motion, factors))
     }
 
-    /// The motion whose matrices are the transposes of these: it has the same roots.
-    pub(super) fn transpose(mut self) -> Self {
+    /// Turns the matrices into their transposes, which have the same roots.
+    pub(super) fn transpose(&mut self) {
         let by_displacement = self.probe(&|field, change| {
             (self.forces).add_derivative(self.state, field, change);
         });
@@ -303,7 +303,11 @@ impl<'a> LinearizedMotion<'a> {
             by_displacement,
             by_velocity,
         });
-        self
+    }
+
+    /// The motion itself again, after [`LinearizedMotion::transpose`].
+    pub(super) fn transpose_back(&mut self) {
+        self.transposed = None;
     }
 
     /// The blocks of a matrix that ties neighbouring nodes of a rod alone.

@@ -6,8 +6,7 @@
 //! (P. Lancaster, Numer. Math. 6, 1964). The denominator is zero where two roots merge, as where flutter begins
 //! without damping: there roots have no derivatives.
 
-use crate::leaf::{DiscreteLeaf, State};
-use crate::modes::arnoldi::RitzPairs;
+use crate::leaf::{DiscreteLeaf, MatrixFactors, State};
 use crate::modes::linearized::LinearizedMotion;
 use crate::motion::Physics;
 use crate::newton::FollowerForces;
@@ -42,25 +41,19 @@ pub fn lowest_pairs(
     time: &Limit,
 ) -> Option<Vec<MotionPair>> {
     let shift = leaf.neutral_shift();
-    let motion = || LinearizedMotion::new(leaf, physics, state, forces, shift);
-    let (direct, mut factors) = motion()?;
-    let right = shapes(&direct, &mut |states| match states {
-        true => direct.eigenpairs_of_states(&mut factors, 2 * count, time),
-        false => direct.eigenpairs_of_squares(&mut factors, 2 * count, time),
-    })?;
-    let (transposed, mut factors) = motion()?;
-    let transposed = transposed.transpose();
-    let left = shapes(&transposed, &mut |states| match states {
-        true => transposed.eigenpairs_of_states(&mut factors, 2 * count, time),
-        false => transposed.eigenpairs_of_squares(&mut factors, 2 * count, time),
-    })?;
+    let (mut motion, mut factors) = LinearizedMotion::new(leaf, physics, state, forces, shift)?;
+    let right = shapes(&motion, &mut factors, count, time)?;
+    // K, and with it the factors, are those of the transposed equations, too.
+    motion.transpose();
+    let left = shapes(&motion, &mut factors, count, time)?;
+    motion.transpose_back();
     let pair = |own: Shape| {
         let distance = |other: &&Shape| (other.root - own.root).norm();
         let other = left
             .iter()
             .min_by(|a, b| distance(a).total_cmp(&distance(b)));
         let other = other.filter(|it| distance(it) <= SAME_ROOT * own.root.norm())?;
-        let slope = |vector: &[c64]| direct.polynomial(own.root, vector).slope;
+        let slope = |vector: &[c64]| motion.polynomial(own.root, vector).slope;
         let [of_own, of_other] = [&own.vector, &other.vector].map(|it| slope(it));
         let product = dot(&other.vector, &of_own);
         let size = |vector: &[c64], slope: &[c64]| {
@@ -86,14 +79,19 @@ struct Shape {
     vector: Vec<c64>,
 }
 
-/// The roots and vectors that are found of squares, or of states, one of each conjugate pair, the nearest to zero
-/// first.
+/// At least `count` roots with their vectors, if there are so many, from their squares or, with damping beside that of
+/// masses, from those of states: one of each conjugate pair, the nearest to zero first.
 fn shapes(
     motion: &LinearizedMotion,
-    find: &mut dyn FnMut(bool) -> Option<RitzPairs>,
+    factors: &mut MatrixFactors,
+    count: usize,
+    time: &Limit,
 ) -> Option<Vec<Shape>> {
     let states = motion.is_damped_beside_masses();
-    let found = find(states)?;
+    let found = match states {
+        true => motion.eigenpairs_of_states(factors, 2 * count, time),
+        false => motion.eigenpairs_of_squares(factors, 2 * count, time),
+    }?;
     let size = motion.solver.size();
     let mut all = Vec::new();
     for (k, it) in found.values.iter().enumerate() {
