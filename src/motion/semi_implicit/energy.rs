@@ -10,15 +10,19 @@ use crate::rotation;
 use glam::DVec3;
 
 impl SemiImplicit {
-    /// What the accepted step of `h` exchanged.
-    pub(super) fn step_energy_exchange(&mut self, h: f64) -> Exchange {
+    /// What the accepted step of `h`, with these strains at its end where they have friction, exchanged.
+    pub(super) fn step_energy_exchange(
+        &mut self,
+        h: f64,
+        strains: Option<&[[DVec3; 2]]>,
+    ) -> Exchange {
         let mut exchange = Exchange {
             dissipated: self.physics.damping * self.momentum_times_displacement(),
             work: self.varying_load_work(h) + self.work_of_wind(h) + self.work_of_followers(h),
         };
         exchange.work += self.work_of_supports();
-        if self.physics.retardation > 0.0 {
-            exchange.dissipated += self.work_of_friction(h);
+        if let Some(strains) = strains {
+            exchange.dissipated += self.work_of_friction(h, strains);
         }
         exchange
     }
@@ -68,10 +72,10 @@ impl SemiImplicit {
     /// The work of internal friction in the accepted step of `h`: the mean of its stresses at both ends times
     /// the change of the strains. Rates that decay within the step, as after a landing, count with the strain
     /// over which they do, not with the time of the step.
-    fn work_of_friction(&mut self, h: f64) -> f64 {
+    fn work_of_friction(&mut self, h: f64, strains: &[[DVec3; 2]]) -> f64 {
         let [c0, c1, c2] = rate_weights(h, self.past_step);
         let mut work = 0.0;
-        for (i, now) in self.strains().iter().enumerate() {
+        for (i, now) in strains.iter().enumerate() {
             let section = &self.sections[i];
             // Not against strains that are suppressed.
             let resistance = |compliance: f64| {

@@ -780,16 +780,17 @@ impl SemiImplicit {
     fn accept(&mut self, h: f64) {
         std::mem::swap(&mut self.state, &mut self.trial);
         std::mem::swap(&mut self.node_motions, &mut self.next_node_motions);
+        let strains = (self.physics.retardation > 0.0).then(|| self.strains());
         if !matches!(self.control, StepControl::CountOnly(_)) {
-            let exchange = self.step_energy_exchange(h);
+            let exchange = self.step_energy_exchange(h, strains.as_deref());
             self.balance.add(exchange);
         }
         if let Some(supports) = &mut self.supports {
             supports.accept();
         }
-        if self.physics.retardation > 0.0 {
+        if let Some(strains) = strains {
             self.strain_history.swap(0, 1);
-            self.strain_history[0] = self.strains();
+            self.strain_history[0] = strains;
         }
         self.corrected_loads = Loads::default();
         self.corrected_factors.fill(0.0);
