@@ -11,8 +11,9 @@ use crate::motion::moving_supports::MovingNode;
 use crate::rod::Wrench;
 use glam::DVec3;
 
-/// The moment and the force on a node whose support moves, besides those of its segments. A moment that turns with
-/// the section does no work on a clamp: the angular momentum of its node, which stays zero, shows none.
+/// The moment and the force on a node whose support moves, besides those of its segments. Moments that turn with the
+/// section are left out where the support holds the rotation: the work of such loads is taken with the angular momentum
+/// of their node, which is zero there, so that both sides leave it out.
 fn support_load(leaf: &DiscreteLeaf, state: &State, it: &MovingNode) -> Wrench {
     let load = leaf.load(state, it.rod, it.node);
     let follower = leaf.follower_wrench(state, it.rod, it.node);
