@@ -734,7 +734,8 @@ fn check_springs(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
     }
     if let Some(item) = entries.given_value(Key::BaseTurnStiffness) {
         let unit = unit(Key::BaseTurnStiffness);
-        for (rod, stiffness) in scenario.base_turn_stiffness.iter().enumerate() {
+        let springs = scenario.base_turn_stiffness.iter().enumerate();
+        for (rod, stiffness) in springs.filter(|(_, stiffness)| **stiffness > 0.0) {
             LIMITS
                 .turn_stiffness
                 .check(item.entry(rod), stiffness / unit)?;

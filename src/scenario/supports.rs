@@ -267,7 +267,10 @@ pub(super) fn read_base_support(entries: &Entries, rods: usize) -> ScenarioResul
     )?;
     let springs = entries.given_value(Key::BaseTurnStiffness);
     let turn_stiffness = match (held.contains(&BaseSupport::Elastic), springs) {
-        (true, Some(springs)) => springs.number_for_each(rods)?,
+        (true, Some(springs)) => {
+            let elastic = held.iter().map(|held| *held == BaseSupport::Elastic);
+            springs.number_for_each_used(&elastic.collect::<Vec<_>>())?
+        }
         (true, None) => {
             return Err(item.value_error(
                 "needs leaf.base_turn_stiffness, the moment per radian of the springs at the bases",
@@ -355,6 +358,15 @@ fn read_grip(
         stiffness,
         turn_stiffness,
     };
+    // Where every place is held, a section that cannot stretch cannot shear, and the force that keeps it from it is any.
+    let [stretch, shear @ ..] =
+        (rods[vein].force_stiffness.each_ref()).map(|of| of.min().is_infinite());
+    let is_stretch_held = grip.is_rigid() && held == SupportKind::Pinned && at[0] < at[1];
+    place.refuse_unless(
+        !is_stretch_held || !stretch || shear == [true; 2],
+        "holds every place of a stretch that shears and is inextensible, where no force along it is determined: give \
+         stiffness.axial a number, clamp the grip, or hold single points",
+    )?;
     Ok(grip)
 }
 

@@ -232,6 +232,7 @@ fn what_cannot_be_is_refused() {
         grip[0].at=[0.5, 0.6, 0.7] => has 3 entries: must have 2
         grip[1].vein=1; grip[1].at=0.5 => grip[1].at = 0.5: is held by grip[0], too
         grip[1].vein=1; grip[1].at=[0.2, 0.3] => grip[0].at = [0.3, 0.7]: is held by grip[1], too
+        grip[0].held=pinned; stiffness.axial=inf; stiffness.shear_2=10 => holds every place of a stretch that shears and is inextensible
         grip[0].held=glued => must be "pinned" (the position is held) or "clamped"
         grip[0].move=[30, 0, 0] => must be at most 10 times the longest rod
         leaf.joined=true; grip[1].at=1.0 => must end before 1: the tip is shared by several rods, or held
@@ -262,6 +263,8 @@ fn what_cannot_be_is_refused() {
         leaf.base=[1e9, 0, 0] => gives |base|/L
         leaf.elevation=[0.1, 0.2] => must have 3
         leaf.base_held=free => must be "clamped"
+        leaf.base_held=["clamped", "elastic", "clamped"]; leaf.base_turn_stiffness=[0, 0, 0] => leaf.base_turn_stiffness, entry 2 = 0: must be greater than 0
+        leaf.base_held=["clamped", "elastic", "clamped"]; leaf.base_turn_stiffness=[-1, 1, 0] => entry 1 = -1: must not be negative
         tissue.along=-1 => must not be negative
         tissue.along=[1, 2, 3] => has 3 entries: must have 2, one per gap
         tissue.across=1e30 => gives k L^4/A

@@ -18,11 +18,13 @@ use crate::figure::drawing::{
 };
 use crate::figure::rod;
 use crate::figure::scenario::FigureSetting;
-use crate::report::numbers::{format_error_bound, format_four_digits, number_in_unit};
+use crate::report::numbers::{
+    format_as_accurate, format_error_bound, format_four_digits, number_in_unit,
+};
 use crate::report::{relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Mode};
-use leafdyn::scenario::units::RATE;
+use leafdyn::scenario::units::{ENERGY, RATE};
 use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::Equilibria;
 use std::f64::consts::TAU;
@@ -95,8 +97,15 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     for (index, (found, veins)) in shown.iter().zip(&shapes).enumerate() {
         let negative = found.equilibrium.stability.negative_eigenvalues;
         let stability = negative.map_or(String::new(), stability_phrase);
-        let energy = found.equilibrium.energy.unwrap_or(f64::NAN);
-        let text = format!("energy {energy:.7}, {stability}");
+        let energy = found.equilibrium.energy.filter(|energy| energy.is_finite());
+        let energy = energy.map(|energy| {
+            let digits = format_as_accurate(&found.equilibrium, energy, energy);
+            format!(
+                "energy {}, ",
+                number_in_unit(digits, &scenario.units, ENERGY)
+            )
+        });
+        let text = energy.unwrap_or_default() + &stability;
         drawing.draw_group("leaf", |page| {
             panels.draw_leaf(page, index, veins, [&(index + 1).to_string(), &text]);
         });

@@ -277,7 +277,7 @@ mod tests {
             ">0, by 0.01 N/cm<",
             ">5<",
             ">\u{2212}2.5<",
-            ">displacement of the tip / cm · 10³<",
+            ">displacement of the tip / 10⁻³ cm<",
         ] {
             assert!(svg.contains(part), "{part}");
         }

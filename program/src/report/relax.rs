@@ -415,7 +415,16 @@ fn tip_change_lines(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
     let change = |found: &Sensitivity| {
         let (key, zero) = (&found.key, found.value == 0.0);
         let by = if zero { 1.0 } else { 0.01 * found.value };
-        let tip = found.tips.first().map(|tip| (*tip * by).to_array());
+        // Of free tips that which moves most.
+        let tips = found.tips.iter().enumerate().rev();
+        let most = tips.max_by(|(_, a), (_, b)| a.length().total_cmp(&b.length()));
+        let which = match most {
+            Some((vein, _)) if found.tips.len() > 1 => {
+                format!("the tip of vein {}, most of all, by", vein + 1)
+            }
+            _ => "the tip by".into(),
+        };
+        let tip = most.map(|(_, tip)| (*tip * by).to_array());
         let error = found.tip_error.unwrap_or(0.0) * by.abs();
         let digits = |it: f64| format_five_digits(round_to_error(it, error));
         let tip = tip.map(|tip| format!("({})", tip.map(digits).join(", ")));
@@ -423,9 +432,9 @@ fn tip_change_lines(equilibrium: &Equilibrium, units: &Units) -> Vec<String> {
         match zero {
             true => {
                 let unit = number_in_key_unit("1".into(), units, key);
-                format!("{key} is 0: each {unit} of it moves the tip by {tip} at first")
+                format!("{key} is 0: each {unit} of it moves {which} {tip} at first")
             }
-            false => format!("+1 % of {key} moves the tip by {tip}"),
+            false => format!("+1 % of {key} moves {which} {tip}"),
         }
     };
     let found = equilibrium.sensitivities.as_deref().unwrap_or_default();

@@ -210,6 +210,15 @@ fn varied_value_text(trace: &Trace, point: &TracePoint) -> String {
     number_in_unit(value, &trace.units, trace.keys.dimension())
 }
 
+/// A bound on the varied value, with its unit.
+fn bound_in_unit(trace: &Trace, error: f64) -> String {
+    number_in_unit(
+        format_error_bound(error),
+        &trace.units,
+        trace.keys.dimension(),
+    )
+}
+
 /// Part of its distance from the base to which a tip without an error is told.
 const DEFAULT_TIP_ERROR: f64 = 1e-3;
 
@@ -223,7 +232,7 @@ fn critical_point_line(trace: &Trace, point: &TracePoint, before: usize) -> Stri
         }
     };
     let within = match point.value_error {
-        Some(error) => format!(", within {}", format_error_bound(error)),
+        Some(error) => format!(", within {}", bound_in_unit(trace, error)),
         None => String::new(),
     };
     let (value, after) = (varied_value_text(trace, point), point.index);
@@ -239,7 +248,7 @@ fn motion_event_line(trace: &Trace, point: &TracePoint, kind: PointKind, before:
         false => "ends",
     };
     let within = match point.value_error {
-        Some(error) => format!(", within {}", format_error_bound(error)),
+        Some(error) => format!(", within {}", bound_in_unit(trace, error)),
         None => String::new(),
     };
     let dominant = point.motion.and_then(|motion| motion.dominant);

@@ -71,10 +71,13 @@ impl ReportedResult for Unbending {
             let rungs: Vec<String> = (ladder.iter().take(RUNGS_TOLD))
                 .map(|rung| format_five_digits(*rung))
                 .collect();
-            lines.push((
-                "ladder",
-                format!("the index changes at {}", rungs.join(", ")),
-            ));
+            let rungs = match self.meaning {
+                ModulusMeaning::Young => {
+                    number_in_key_unit(rungs.join(", "), units, "section.young")
+                }
+                ModulusMeaning::Factor => rungs.join(", "),
+            };
+            lines.push(("ladder", format!("the index changes at {rungs}")));
         } else {
             lines.push(("bound", "none: the posture is stable at any E".into()));
         }

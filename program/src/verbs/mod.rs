@@ -93,7 +93,13 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
             return ExitStatus::Refused as u8;
         }
         Err(error) if error.use_stderr() => {
-            let message = error.render().to_string() + scenario_suggestion(&error);
+            let message = error.render().to_string();
+            let message = NUMBER_PROBLEMS
+                .iter()
+                .fold(message, |message, (said, meant)| {
+                    message.replace(said, meant)
+                });
+            let message = message + scenario_suggestion(&error);
             let message = message.trim_start_matches("error: ").trim_end();
             return report_refusal(message, json) as u8;
         }
@@ -114,6 +120,23 @@ pub fn main_with(arguments: Vec<OsString>) -> u8 {
     });
     status.exit_code() as u8
 }
+
+/// What the standard library says of texts that are no numbers, and what is meant.
+const NUMBER_PROBLEMS: [(&str, &str); 4] = [
+    (
+        ": invalid digit found in string",
+        ": must be a whole number",
+    ),
+    (
+        ": cannot parse integer from empty string",
+        ": must be a whole number",
+    ),
+    (": invalid float literal", ": must be a number"),
+    (
+        ": cannot parse float from empty string",
+        ": must be a number",
+    ),
+];
 
 /// How to get a scenario, if none is named.
 fn scenario_suggestion(error: &clap::Error) -> &'static str {

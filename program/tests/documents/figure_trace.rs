@@ -45,7 +45,7 @@ fn the_quantity_is_chosen_and_each_has_a_panel() {
     assert_eq!(panels.len(), 3);
     assert!(svg.contains(">force on the tip along x<") && !svg.contains("load.tip_force"));
     // A twist that is rounding is drawn as none: its axis is wider.
-    let names = [">x of the tip<", ">energy<", ">mean twist / rad · 10⁹<"];
+    let names = [">x of the tip<", ">energy<", ">mean twist / 10⁻⁹ rad<"];
     for (panel, name) in panels.iter().zip(names) {
         assert!(panel.contains(name), "{name}");
     }

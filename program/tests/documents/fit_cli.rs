@@ -67,7 +67,7 @@ fn panels_are_those_of_the_data() {
     for panel in [tip_z, tip_x] {
         contains(
             panel,
-            &[">force on the tip along z / N · 10³<", "data less model"],
+            &[">force on the tip along z / 10⁻³ N<", "data less model"],
         );
         assert!(!panel.contains(">experiment<"));
     }

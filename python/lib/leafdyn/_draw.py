@@ -15,6 +15,12 @@ PARTS = 8
 TICKS = 7
 """Of the longest axis in space."""
 
+LABEL_PADS = (1.5, 0.5, 2.0)
+"""Of the name of each axis in space, for each letter of the longest label of a tick, in points."""
+
+ZOOM = 1.05
+"""How large a leaf is in its axes in space."""
+
 RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -81,12 +87,16 @@ def drawn_plane(ax: Any) -> tuple[int, int]:
 
 
 def ticks_by_length(ax: Any) -> None:
-    """Give every axis in space as many ticks as its length has room for: those of a narrow leaf would overlap."""
+    """Give every axis in space as many ticks as its length has room for: those of a narrow leaf would overlap; and its
+    name the distance that the labels of the ticks need."""
     from matplotlib.ticker import MaxNLocator
 
     spans = [np.ptp(limits) for limits in (ax.get_xlim(), ax.get_ylim(), ax.get_zlim())]
-    for axis, span in zip((ax.xaxis, ax.yaxis, ax.zaxis), spans):
+    for axis, span, pad in zip((ax.xaxis, ax.yaxis, ax.zaxis), spans, LABEL_PADS):
         axis.set_major_locator(MaxNLocator(nbins=max(1, round(TICKS * span / max(spans))), min_n_ticks=1))
+        longest = max(map(len, axis.get_major_formatter().format_ticks(axis.get_majorticklocs())), default=0)
+        axis.labelpad = pad * longest
+    ax.set_box_aspect(spans, zoom=ZOOM)
 
 
 def smooth(

@@ -325,6 +325,12 @@ impl<'e> EntryValue<'e> {
 
     /// A number for each of `count` rods or gaps: one for all, or a list.
     pub fn number_for_each(&self, count: usize) -> ScenarioResult<Vec<f64>> {
+        self.number_for_each_used(&vec![true; count])
+    }
+
+    /// A number for each rod or gap: one for all, or a list, in which those that are not used may be 0.
+    pub fn number_for_each_used(&self, used: &[bool]) -> ScenarioResult<Vec<f64>> {
+        let count = used.len();
         if number_of_value(self.value).is_some() || self.intended_number().is_some() {
             return Ok(vec![self.number()?; count]);
         }
@@ -340,7 +346,11 @@ impl<'e> EntryValue<'e> {
             _ => format!("a number or a list of {count} (one per {each})"),
         };
         let list = self.list_of_length(count, &because, &needed)?;
-        list.map(|item| item.number()).collect()
+        let numbers = list.zip(used).map(|(item, used)| match used {
+            true => item.number(),
+            false => item.number_in(NumberRange::NotNegative),
+        });
+        numbers.collect()
     }
 
     /// A profile for each of `rods` rods.

@@ -359,7 +359,8 @@ pub(super) fn nearest_key(path: &str) -> Option<&'static str> {
 fn unknown_key_message(path: &str) -> String {
     let found = shorten_excerpt(path);
     match nearest_key(path) {
-        Some(meant) if meant != path => {
+        // The name of its table says less than what is in it.
+        Some(meant) if path != meant && !path.starts_with(&format!("{meant}.")) => {
             return format!("unknown key {found} (did you mean {meant}?)");
         }
         _ => (),

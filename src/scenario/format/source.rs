@@ -261,13 +261,34 @@ const MINUS_SIGNS: [char; 7] = [
     '\u{2010}', '\u{2011}', '\u{2012}', '\u{2013}', '\u{2014}', '\u{2015}', '\u{2212}',
 ];
 
+/// Most characters of a unit behind a number.
+const LONGEST_UNIT: usize = 8;
+
 /// How a text that a person would read as a number is written as one.
 pub(crate) fn intended_number(text: &str) -> Option<String> {
     let meant = text.trim().replace(MINUS_SIGNS, "-").replacen(',', ".", 1);
-    meant
-        .parse::<f64>()
-        .ok()
-        .filter(|number| number.is_finite())?;
+    let finite = |text: &str| text.parse::<f64>().ok().filter(|number| number.is_finite());
+    if finite(&meant).is_none() {
+        // A number with a unit behind it.
+        let end = meant.char_indices().map(|(end, _)| end).rev();
+        let end = end
+            .into_iter()
+            .find(|&end| finite(meant[..end].trim_end()).is_some())?;
+        let (number, unit) = (finite(meant[..end].trim_end())?, meant[end..].trim_start());
+        let is_unit = |c: char| c.is_alphanumeric() || "°µ%/^²³*·-".contains(c);
+        if unit.chars().count() > LONGEST_UNIT || !unit.chars().all(is_unit) {
+            return None;
+        }
+        return Some(match unit {
+            "deg" | "°" | "degree" | "degrees" => {
+                format!(
+                    "angles are in radians, of which {number} degrees are {}",
+                    number.to_radians()
+                )
+            }
+            unit => format!("write it without {unit}, in the units of the scenario ([units])"),
+        });
+    }
     let how = [
         (text.contains(','), "with a decimal point"),
         (text.contains(MINUS_SIGNS), "with a hyphen as minus sign"),
@@ -353,6 +374,10 @@ mod tests {
             '1,5' => leaf.length = '1,5': must be a number: write 1.5, with a decimal point
             '1.5' => must be a number: write 1.5, without quotes
             'long' => must be a number or a list of 1
+            '30 cm' => must be a number: write it without cm, in the units of the scenario
+            '5e8Pa' => must be a number: write it without Pa
+            '90deg' => must be a number: angles are in radians, of which 90 degrees are 1.5707963267948966
+            '1.5 in all, more or less' => must be a number or a list of 1
         ";
         for (length, said) in pairs(lengths) {
             let refused = rod(length, "inf", LOAD).unwrap_err();

@@ -103,8 +103,10 @@ impl PanelAxes {
         let (middle, end) = (self.cell.middle(), self.cell.opposite_corner());
         let rim = Stroke::new(FRAME_COLOR, 0.8);
         page.draw_stroke(rectangle_path(corner, size), rim);
-        let font = Font::embedded();
-        let mut widest = 0.0_f64;
+        let widest = self.widest_label();
+        // Long labels are written smaller, so that the name has its place beside them.
+        let room = AXIS_MARKS.largest_name_beside - AXIS_MARKS.name_label_gap;
+        let size_beside = FONT_SIZE.tick * (room / widest.max(room));
         for (axis, direction, length, out) in [
             (&self.across, AxisOrientation::Horizontal, size.x, DVec2::Y),
             (&self.up, AxisOrientation::Vertical, size.y, DVec2::NEG_X),
@@ -137,11 +139,10 @@ impl PanelAxes {
                         page.draw_centered_label(
                             end,
                             &text,
-                            FONT_SIZE.tick,
+                            size_beside,
                             TextAnchor::End,
                             NOTE_COLOR,
                         );
-                        widest = widest.max(font.text_width(&text, FONT_SIZE.tick));
                     }
                 }
             }
@@ -162,6 +163,15 @@ impl PanelAxes {
             let base = DVec2::new(corner.x - distance, middle.y);
             page.draw_rotated_label(base, &self.up.title(), FONT_SIZE.text, TEXT_COLOR);
         }
+    }
+
+    /// The width of the widest label beside the frame.
+    fn widest_label(&self) -> f64 {
+        let font = Font::embedded();
+        let ticks = self.up.ticks(self.cell.size.y, AxisOrientation::Vertical);
+        let widths = ticks.iter().filter(|_| self.up.labelled);
+        let widths = widths.map(|tick| font.text_width(&tick.text, FONT_SIZE.tick));
+        widths.fold(0.0, f64::max)
     }
 
     /// Draws the part of a curve through these points that is inside the frame, with
@@ -465,12 +475,15 @@ impl Axis {
         }
     }
 
-    /// The name, with the power of ten by which values are multiplied.
+    /// The name, with the unit of the labels: a power of ten times that of the values.
     pub fn title(&self) -> String {
         match self.label_power_of_ten() {
             _ if self.name.is_empty() => String::new(),
             0 => self.name.clone(),
-            power => format!("{} · 10{}", self.name, superscript(-power)),
+            power => match self.name.rsplit_once(" / ") {
+                Some((name, unit)) => format!("{name} / 10{} {unit}", superscript(power)),
+                None => format!("{} / 10{}", self.name, superscript(power)),
+            },
         }
     }
 
@@ -711,8 +724,8 @@ mod axis_tests {
     fn linear_axes_have_few_digits() {
         for (low, high, name) in [
             (0.0, 12.0, "t"),
-            (0.0, 3e-5, "t · 10⁶"),
-            (-2e7, 1e6, "t · 10⁻⁶"),
+            (0.0, 3e-5, "t / 10⁻⁶"),
+            (-2e7, 1e6, "t / 10⁶"),
             (0.02, 0.5, "t"),
         ] {
             let axis = Axis::linear_covering("t", [low, high].into_iter());
@@ -724,6 +737,8 @@ mod axis_tests {
                 assert!((0.0..=1.0).contains(&tick.fraction), "{tick:?}");
             }
         }
+        let axis = Axis::linear_covering("tip / cm", [0.0, 3e-5].into_iter());
+        assert_eq!(axis.title(), "tip / 10⁻⁶ cm");
     }
 
     #[test]

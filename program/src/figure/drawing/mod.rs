@@ -463,6 +463,9 @@ const PIECE_LENGTH: f64 = 5.0;
 
 const MOST_PIECES_BETWEEN_POINTS: usize = 24;
 
+/// The tangent at a point of a curve is at most so many times as long as the chord on its other side.
+const LONGEST_SWING: f64 = 2.0;
+
 /// A curve through these points as straight pieces: for every point but the last those that lead
 /// from it to the next. Between two points it is a cubic with the tangents of parabolas through
 /// three points each, over the lengths of the chords. Where the chords turn back the curve has a
@@ -488,7 +491,12 @@ pub fn smooth_curve(points: &[DVec2]) -> Vec<Vec<DVec2>> {
     };
     (0..chords.len())
         .map(|k| {
-            let [from, to] = tangents(k).map(|tangent| length(k) * tangent);
+            // A long chord does not swing out by the slope of a short one beside it.
+            let beside = [k.checked_sub(1), Some(k + 1).filter(|k| *k < chords.len())];
+            let [from, to] = [0, 1].map(|end| {
+                let most = beside[end].map_or(f64::INFINITY, |k| LONGEST_SWING * length(k));
+                length(k).min(most) * tangents(k)[end]
+            });
             let (a, b) = (points[k], points[k + 1]);
             let count =
                 ((length(k) / PIECE_LENGTH).ceil() as usize).clamp(1, MOST_PIECES_BETWEEN_POINTS);
@@ -559,6 +567,16 @@ mod tests {
             off[0] < 1.5 && off[1] < off[0] / 7.0 && off[2] < off[1] / 7.0,
             "{off:?}"
         );
+    }
+
+    /// A flat chord of 100 beside a steep one of 10 swings out by a few.
+    #[test]
+    fn uneven_points_do_not_swing_out() {
+        let points =
+            [[0.0, 0.0], [100.0, 0.0], [101.0, 10.0], [101.5, 30.0]].map(DVec2::from_array);
+        let drawn = smooth_curve(&points);
+        let lowest = drawn.iter().flatten().map(|it| it.y).fold(0.0, f64::min);
+        assert!(lowest > -4.0, "{lowest}");
     }
 
     #[test]
