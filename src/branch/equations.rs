@@ -523,33 +523,49 @@ impl<const N: usize> BranchEquations<'_, N> {
         rates: &[NodalField],
         shift: f64,
     ) -> Result<BorderedSolve, CorrectorFailure> {
-        let p = border.len();
-        let pattern = self.pattern(p)?;
-        self.factorizations += 1;
-        let factor = pattern.factorize_bordered(&self.system, shift, border);
-        let mut factor = factor.map_err(|_| CorrectorFailure::TooLarge)?;
-        let none = vec![0.0; p];
-        let zero = scale_field(forces, 0.0);
-        let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
-        let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
-        let columns = units.iter().map(|unit| factor.solve_bordered(&zero, unit));
-        let columns: Vec<BorderedSolution> = columns.collect();
-        let responses = BorderedResponses {
-            h: DMatrix::from_fn(p, p, |r, c| {
-                0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
-            }),
-            modes: columns.into_iter().map(|it| it.increments).collect(),
-            forces: factor.solve_bordered(forces, &none),
-            rates: (rates.iter())
-                .map(|rate| factor.solve_bordered(rate, &none))
-                .collect(),
-            negative: factor.negative_eigenvalue_count(),
-        };
-        Ok(BorderedSolve {
-            responses,
-            factors: factor,
-        })
+        let factors = self.factorize_bordered(border, shift)?;
+        Ok(bordered_responses(factors, border.len(), forces, rates))
     }
+
+    /// The factors of K + `shift` M with this border, where K is the assembled matrix.
+    pub(super) fn factorize_bordered(
+        &mut self,
+        border: &[NodalField],
+        shift: f64,
+    ) -> Result<MatrixFactors, CorrectorFailure> {
+        let pattern = self.pattern(border.len())?;
+        self.factorizations += 1;
+        let factors = pattern.factorize_bordered(&self.system, shift, border);
+        factors.map_err(|_| CorrectorFailure::TooLarge)
+    }
+}
+
+/// The solutions of equations with `p` borders that are factorized: for the forces, their rates, and the unit
+/// vectors of the border.
+pub(super) fn bordered_responses(
+    mut factors: MatrixFactors,
+    p: usize,
+    forces: &NodalField,
+    rates: &[NodalField],
+) -> BorderedSolve {
+    let none = vec![0.0; p];
+    let zero = scale_field(forces, 0.0);
+    let unit = |i: usize| (0..p).map(|k| if k == i { 1.0 } else { 0.0 }).collect();
+    let units: Vec<Vec<f64>> = (0..p).map(unit).collect();
+    let columns = units.iter().map(|unit| factors.solve_bordered(&zero, unit));
+    let columns: Vec<BorderedSolution> = columns.collect();
+    let responses = BorderedResponses {
+        h: DMatrix::from_fn(p, p, |r, c| {
+            0.5 * (columns[c].multipliers[r] + columns[r].multipliers[c])
+        }),
+        modes: columns.into_iter().map(|it| it.increments).collect(),
+        forces: factors.solve_bordered(forces, &none),
+        rates: (rates.iter())
+            .map(|rate| factors.solve_bordered(rate, &none))
+            .collect(),
+        negative: factors.negative_eigenvalue_count(),
+    };
+    BorderedSolve { responses, factors }
 }
 
 impl BranchEquations<'_> {

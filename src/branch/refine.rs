@@ -189,6 +189,9 @@ pub(super) fn verify_regular_point(
     }
     let in_plane = NestedRegularPoint::new(family, grid, point, accuracy, true);
     verify_over_grids(in_plane).or_else(|doubt| {
+        if family.limit.reached() {
+            return Err(doubt);
+        }
         let other = verify_at_parameter(family, grid, point, accuracy);
         // Beside a fold of a finer grid that grid may have no point at this parameter.
         other.map_err(|other| match doubt {

@@ -12,7 +12,7 @@
 //! of the leaf is not reduced meanwhile, which near a fold would lead elsewhere.
 
 use crate::branch::equations::{
-    AssembledForces, BranchEquations, CorrectorFailure, factorize_matrix,
+    AssembledForces, BranchEquations, CorrectorFailure, bordered_responses, factorize_matrix,
 };
 use crate::branch::points::{
     EquilibriumPoint, ParametrizedState, add_scaled, largest, scale_field, scaled_sum,
@@ -62,6 +62,50 @@ const SHIFTS: MatrixShifts = MatrixShifts {
     largest: 1e6,
     eigenvalue_factor: 1.05,
 };
+
+impl MatrixShifts {
+    /// The shifts of which the least with which the matrix across the path is positive definite is taken, from
+    /// that of `least` on.
+    fn across(&self, least: f64) -> Vec<f64> {
+        let next = |shift: &f64| Some((4.0 * shift).max(self.first));
+        let all = std::iter::successors(Some(least), next);
+        all.take_while(|shift| *shift < self.largest).collect()
+    }
+
+    /// The shifts of which the least with which the whole matrix is positive definite is taken.
+    fn of_lowest_mode(&self) -> Vec<f64> {
+        let all = std::iter::successors(Some(self.first), |shift| Some(2.0 * shift));
+        all.take_while(|shift| *shift <= self.largest).collect()
+    }
+}
+
+/// The numbers of the shifts that the step before took: where the search for those of the next begins. As a
+/// matrix that is definite with a shift is so with all larger ones, what is found does not depend on them.
+#[derive(Clone, Copy, Default)]
+struct ShiftsBefore {
+    across: usize,
+    lowest_mode: usize,
+}
+
+/// The least of ascending shifts that is `enough`, as all larger ones are, and what it gives. The search begins
+/// at that with the number `near`, which is set to the number of the one found.
+fn least_shift<T>(
+    shifts: &[f64],
+    near: &mut usize,
+    mut enough: impl FnMut(f64) -> Option<T>,
+) -> Option<(f64, T)> {
+    let from = (*near).min(shifts.len().checked_sub(1)?);
+    let found = (from..shifts.len()).find_map(|k| Some((k, enough(shifts[k])?)));
+    let (mut number, mut given) = found?;
+    while number > 0 && number <= from {
+        let Some(lower) = enough(shifts[number - 1]) else {
+            break;
+        };
+        (number, given) = (number - 1, lower);
+    }
+    *near = number;
+    Some((shifts[number], given))
+}
 
 /// Steps of inverse iteration for the lowest mode with one shift.
 const INVERSE_ITERATIONS: usize = 4;
@@ -129,16 +173,17 @@ impl BranchEquations<'_> {
             params: [fraction],
         };
         let mut before: Option<FloorStep> = None;
+        let mut shifts = ShiftsBefore::default();
         for _ in 0..STEPS.most_climbing {
             if stop() {
                 return None;
             }
             let linear = self.assemble(&mut now, false).ok()?;
-            let mut valley = self.valley(&direction, &linear)?;
+            let mut valley = self.valley(&direction, &linear, &mut shifts.across)?;
             if valley.curvature < 0.0 || valley.shift > linear.shift {
                 // Beyond the inflection follow the mode of the lowest eigenvalue.
-                direction = self.lowest_mode(&direction)?;
-                valley = self.valley(&direction, &linear)?;
+                direction = self.lowest_mode(&direction, &mut shifts.lowest_mode)?;
+                valley = self.valley(&direction, &linear, &mut shifts.across)?;
             }
             // With exactly one negative eigenvalue the full step is Newton's.
             let newton = valley.curvature < 0.0 && valley.shift == linear.shift;
@@ -195,7 +240,7 @@ impl BranchEquations<'_> {
     ) -> Result<[Result<EquilibriumPoint, State>; 2], CorrectorFailure> {
         self.assemble(&mut saddle.solution(), false)?;
         let mode = self
-            .lowest_mode(direction)
+            .lowest_mode(direction, &mut 0)
             .ok_or(CorrectorFailure::NotConverged)?;
         Ok([1.0, -1.0].map(|sign| {
             let direction = scale_field(&mode, sign);
@@ -219,10 +264,11 @@ impl BranchEquations<'_> {
         let pushed = self.state_after_increments(state, params, &push, 1.0);
         let state = pushed.map_err(|_| state.clone())?;
         let mut now = ParametrizedState { state, params };
+        let mut shift = 0;
         for _ in 0..STEPS.most_descending {
             let next = match stop() {
                 true => None,
-                false => self.descend_step(&mut now, &mut direction, &mut length),
+                false => self.descend_step(&mut now, &mut direction, &mut length, &mut shift),
             };
             let Some(next) = next else {
                 return Err(now.state);
@@ -237,15 +283,16 @@ impl BranchEquations<'_> {
     }
 
     /// A step down the valley floor from `now`, after which `direction` is that of the floor and
-    /// `length` that of the next step.
+    /// `length` that of the next step; `shift` is the number of the shift across it.
     fn descend_step(
         &mut self,
         now: &mut ParametrizedState,
         direction: &mut NodalField,
         length: &mut f64,
+        shift: &mut usize,
     ) -> Option<DescentStep> {
         let linear = self.assemble(now, false).ok()?;
-        let valley = self.valley(direction, &linear)?;
+        let valley = self.valley(direction, &linear, shift)?;
         let newton = valley.curvature > 0.0 && valley.shift == linear.shift;
         let increments = if newton {
             valley.newton()
@@ -268,45 +315,45 @@ impl BranchEquations<'_> {
         })
     }
 
-    /// The valley along `direction`, from the assembled matrix.
-    fn valley(&mut self, direction: &NodalField, linear: &AssembledForces) -> Option<ValleyFloor> {
+    /// The valley along `direction`, from the assembled matrix; the search for its shift begins `near` that
+    /// with this number.
+    fn valley(
+        &mut self,
+        direction: &NodalField,
+        linear: &AssembledForces,
+        near: &mut usize,
+    ) -> Option<ValleyFloor> {
         let border = [self.multiply_by_mass(direction)];
-        let mut shift = linear.shift;
-        while shift < SHIFTS.largest {
-            let solved = self.solve_bordered(&border, &linear.forces, &[], shift);
-            let mut solved = solved.ok()?.responses;
-            // One negative eigenvalue is due to the border.
-            if solved.negative <= 1 {
-                let along = solved.modes.swap_remove(0);
-                let mass = self.mass * self.mass_product(&along, &along);
-                return Some(ValleyFloor {
-                    along,
-                    force: solved.forces.multipliers[0],
-                    curvature: -solved.h[(0, 0)] - shift * mass,
-                    across: solved.forces.increments,
-                    shift,
-                });
-            }
-            shift = (4.0 * shift).max(SHIFTS.first);
-        }
-        None
+        // One negative eigenvalue is due to the border.
+        let definite = |shift: f64| {
+            let factors = self.factorize_bordered(&border, shift).ok();
+            factors.filter(|factors| factors.negative_eigenvalue_count() <= 1)
+        };
+        let (shift, factors) = least_shift(&SHIFTS.across(linear.shift), near, definite)?;
+        let mut solved = bordered_responses(factors, 1, &linear.forces, &[]).responses;
+        let along = solved.modes.swap_remove(0);
+        let mass = self.mass * self.mass_product(&along, &along);
+        Some(ValleyFloor {
+            along,
+            force: solved.forces.multipliers[0],
+            curvature: -solved.h[(0, 0)] - shift * mass,
+            across: solved.forces.increments,
+            shift,
+        })
     }
 
     /// The mode of the lowest eigenvalue of the assembled matrix, oriented along `direction`, by
-    /// inverse iteration from `direction`; the second time with a shift near that eigenvalue.
-    fn lowest_mode(&mut self, direction: &NodalField) -> Option<NodalField> {
+    /// inverse iteration from `direction`; the second time with a shift near that eigenvalue. The search for
+    /// the first shift begins `near` that with this number.
+    fn lowest_mode(&mut self, direction: &NodalField, near: &mut usize) -> Option<NodalField> {
         let pattern = self.pattern(0).ok()?;
         let mut mode = direction.clone();
-        let mut shift = SHIFTS.first;
-        for _ in 0..2 {
-            let mut factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
-            while factor.negative_eigenvalue_count() > 0 {
-                shift *= 2.0;
-                if shift > SHIFTS.largest {
-                    return None;
-                }
-                factor = factorize_matrix(&pattern, &self.system, shift).ok()?;
-            }
+        let definite = |shift: f64| {
+            let factors = factorize_matrix(&pattern, &self.system, shift).ok();
+            factors.filter(|factors| factors.negative_eigenvalue_count() == 0)
+        };
+        let (mut shift, mut factor) = least_shift(&SHIFTS.of_lowest_mode(), near, definite)?;
+        for again in [true, false] {
             let mut eigenvalue = 0.0;
             for _ in 0..INVERSE_ITERATIONS {
                 let next = factor
@@ -315,7 +362,12 @@ impl BranchEquations<'_> {
                 eigenvalue = 1.0 / (self.mass * self.mass_product(&mode, &next)) - shift;
                 mode = self.normalize_by_mass(&next);
             }
-            shift = SHIFTS.eigenvalue_factor * eigenvalue.abs();
+            if again {
+                let nearest = SHIFTS.eigenvalue_factor * eigenvalue.abs();
+                let doubled = std::iter::successors(Some(nearest), |shift| Some(2.0 * shift));
+                let shifts: Vec<f64> = doubled.take_while(|it| *it <= SHIFTS.largest).collect();
+                (shift, factor) = least_shift(&shifts, &mut 0, definite)?;
+            }
         }
         let same = self.mass_product(&mode, direction) >= 0.0;
         Some(if same { mode } else { scale_field(&mode, -1.0) })
@@ -327,5 +379,33 @@ impl BranchEquations<'_> {
             direction,
             1.0 / self.mass_product(direction, direction).sqrt(),
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The least shift that is enough is found wherever the search begins: with two trials from the one before it
+    /// or from itself, and with one more for every shift in between.
+    #[test]
+    fn the_least_shift_does_not_depend_on_where_the_search_begins() {
+        let shifts = SHIFTS.across(0.0);
+        assert_eq!(shifts[..4], [0.0, 1.0, 4.0, 16.0]);
+        assert!(shifts.iter().all(|shift| *shift < SHIFTS.largest));
+        for (needed, least) in shifts.iter().enumerate() {
+            for from in 0..shifts.len() + 3 {
+                let (mut near, mut trials) = (from, 0);
+                let found = least_shift(&shifts, &mut near, |shift| {
+                    trials += 1;
+                    (shift >= *least).then_some(2.0 * shift)
+                });
+                assert_eq!((found, near), (Some((*least, 2.0 * least)), needed));
+                let from = from.min(shifts.len() - 1);
+                let below = usize::from(needed > 0 && needed <= from);
+                assert_eq!(trials, 1 + needed.abs_diff(from) + below);
+            }
+        }
+        assert_eq!(least_shift(&shifts, &mut 3, |_| None::<()>), None);
     }
 }

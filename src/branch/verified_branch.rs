@@ -215,6 +215,8 @@ impl VerifiedBranch {
             + critical.len())
             .into_par_iter()
             .map(|k| match points.get(k) {
+                // What is still to be verified is lost.
+                _ if family.limit.reached() => Err(VerificationFailure::Unsolved),
                 Some(point) => verify_regular_point(family, grid, point, accuracy),
                 None => {
                     let critical = &critical[k - points.len()].1;

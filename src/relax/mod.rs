@@ -45,6 +45,7 @@ pub use crate::relax::remark::{
     CriticalTipForceRemark, EquilibriumDoubt, EquilibriumRemark, MarginRemark, MotionVerdict,
     RestObstacle, SpanHolder, VeinsRemark,
 };
+pub(crate) use crate::relax::request::check_natural_tips;
 pub use crate::relax::request::{
     LARGEST_TOLERANCE, MAX_NODES, MOST_MODES, Method, Options, Progress, RelaxError,
     SMALLEST_TOLERANCE, SemiImplicit, Settings, ShootingVariant, UnsupportedSetting,

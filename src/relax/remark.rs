@@ -229,7 +229,7 @@ remarks! {
         Loads {
             /// Up to where the leaf came to rest on its path, if it has one.
             reached: Option<PathPosition>,
-            /// Keys of the largest loads; none of a leaf without loads.
+            /// Keys of the largest loads, first the growth that strains the tissue; none of a leaf without either.
             loads: Vec<&'static str>,
             /// Key of the softest stiffness, in its table.
             stiffness: &'static str,

@@ -3,7 +3,7 @@
 //! What a motion costs by either method is known or estimated beforehand: numbers of steps times measured
 //! times.
 
-use crate::leaf::{DiscreteLeaf, State};
+use crate::leaf::{DiscreteLeaf, Leaf, State};
 use crate::motion::{
     Explicit, ExplicitRefusal, MotionTimes, Physics, SemiImplicit, StepControl, TimeIntegrator,
 };
@@ -105,7 +105,7 @@ impl fmt::Display for SchemeChoice {
             }
             SchemeReason::ShortPulse => "a load has a pulse too short for the semi-implicit method",
             SchemeReason::GivenStep => "of steps of a given length the explicit ones are cheaper",
-            SchemeReason::Cost => "it costs less: ",
+            SchemeReason::Cost => "it costs less on the first grid: ",
         })?;
         let Some([explicit, semi_implicit]) = self.costs else {
             return Ok(());
@@ -221,14 +221,13 @@ pub(super) fn semi_implicit_step(rods: usize, segments: usize) -> f64 {
     COSTS.semi_implicit_step + COSTS.semi_implicit_segment * segments as f64
 }
 
-/// Approximate seconds of a semi-implicit step of a leaf, whose tissue takes most of them if it has any.
-fn semi_implicit_step_of_leaf(leaf: &DiscreteLeaf) -> f64 {
-    let (rods, segments) = (leaf.rods(), leaf.segments());
-    let strips = match leaf.leaf.has_tissue() {
-        true => rods.saturating_sub(1) * segments,
+/// Approximate seconds that tissue adds to a semi-implicit step, of which it takes most.
+pub(super) fn semi_implicit_step_of_tissue(leaf: &Leaf, segments: usize) -> f64 {
+    let strips = match leaf.has_tissue() {
+        true => leaf.rods().saturating_sub(1) * segments,
         false => 0,
     };
-    semi_implicit_step(rods, segments) + COSTS.semi_implicit_strip * strips as f64
+    COSTS.semi_implicit_strip * strips as f64
 }
 
 /// The cost of the whole motion by the explicit method: all its steps have the same length.
@@ -263,7 +262,8 @@ pub(super) fn semi_implicit_cost(
         .min(PILOT.largest_error)
         .max(tolerance);
     let of_step = (error / tolerance).powf(PILOT.step_exponent);
-    let seconds = semi_implicit_step_of_leaf(leaf);
+    let seconds = semi_implicit_step(leaf.rods(), leaf.segments())
+        + semi_implicit_step_of_tissue(&leaf.leaf, leaf.segments());
     let cost = |steps: f64, at_least: bool| MotionCost {
         steps,
         seconds: steps * seconds,

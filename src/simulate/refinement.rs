@@ -271,10 +271,10 @@ impl Refinement {
         let Ok(next) = self.build_with_steps(halved) else {
             return;
         };
-        // Explicit steps may have to be shorter than half as long.
-        let known = next.expected();
-        self.expected = known.unwrap_or((2.0 * ended.steps() as f64, expected));
-        if self.seconds + self.expected.1 <= REFINEMENT_SECONDS {
+        // Explicit steps may have to be shorter than half as long; tissue adds nothing to what they take.
+        let (steps, counted) = (next.expected()).unwrap_or((2.0 * ended.steps() as f64, expected));
+        self.expected = (steps, steps * next.seconds_of_a_step());
+        if self.seconds + counted <= REFINEMENT_SECONDS {
             self.before = Some(now);
             self.resolution = Resolution {
                 step: next.longest_step(),

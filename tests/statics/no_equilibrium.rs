@@ -1,6 +1,8 @@
 //! Where a leaf cannot come to rest, the message names what keeps it from it.
 
-use leafdyn::relax::{Equilibrium, EquilibriumRemark, Options, RelaxError, RestObstacle, relax};
+use leafdyn::relax::{
+    Equilibrium, EquilibriumRemark, Method, Options, RelaxError, RestObstacle, relax,
+};
 use leafdyn_testing::*;
 
 const RIGID: &str = r#"
@@ -129,4 +131,20 @@ fn a_search_for_any_index_ends_after_three_grids() {
         // Processors round differently.
         assert!(needed <= factorizations * 6 / 5, "{leaf}: {needed}");
     }
+}
+
+/// Where veins grow and the tissue between them does not, that is named: a blade whose margins have grown by a
+/// twentieth.
+#[test]
+fn growth_that_strains_tissue_is_named() {
+    let grown = "tissue.grown=false; rest.stretch=[1.05, 1.0375, 1.025, 1.0125, 1.0, 1.0125, 1.025, 1.0375, 1.05]";
+    let options = Options {
+        method: Method::default().on_grid(Some(8)),
+        ..Options::default()
+    };
+    let leaf = leafdyn_testing::relaxed(&scenario("measured/blade", grown), &options);
+    assert!(!leaf.outcome.is_at_rest());
+    let told = leaf.remark.expect("it says why").to_string();
+    let named = "lower the growth by rest.stretch, or raise ";
+    assert!(told.contains(named), "{told}");
 }

@@ -3,8 +3,9 @@
 
 use leafdyn::relax::Method;
 use leafdyn::study::{
-    BaseScenario, CheckOptions, CheckVerdict, ParameterKeys, check, relax_with_sensitivities,
+    BaseScenario, CheckOptions, CheckVerdict, ParameterKeys, check, relax_with_sensitivities, trace,
 };
+use leafdyn_testing::branch::request;
 use leafdyn_testing::*;
 
 /// Three veins in space, with loads; no two alike.
@@ -257,4 +258,28 @@ fn tips_that_rigid_tissue_keeps_apart_are_refused() {
         refused.contains("leaf.joined = false") && refused.contains("apart"),
         "{refused}"
     );
+}
+
+/// Two straight veins whose tips meet.
+const MEETING: &str = r#"
+    name = "two veins"
+    leaf = { rods = 2, length = 1.0, fan = [0.1001674211615598, -0.1001674211615598], joined = true, base = [[0.0, -0.1, 0.0], [0.0, 0.1, 0.0]] }
+    stiffness = { torsion = 1.0, bending_2 = 1.0, bending_3 = 2.0, axial = 300.0, shear_2 = 200.0, shear_3 = 200.0 }
+    tissue = { along = inf, across = 50.0, normal = inf }
+    rest = { stretch = [1.0, 1.0] }
+    load = { gravity = [0.0, 0.0, -0.5] }
+"#;
+
+/// A trace refuses an end of its range at which growth keeps such tips apart, before it follows anything.
+#[test]
+fn a_trace_to_tips_that_growth_keeps_apart_is_refused() {
+    assert!(base(MEETING, "").scenario().relaxation().run().is_ok());
+    for range in ["1..1.05", "1.05..1"] {
+        let vary = format!("rest.stretch[0]={range}");
+        let request = request(base(MEETING, ""), &vary, 1e-6, 100);
+        let refused = trace(&request, &mut |_, _, _| panic!("it is not followed"));
+        let refused = refused.unwrap_err().to_string();
+        let says = ["rest.stretch[0] = 1.05: ", "apart", "tissue.grown = false"];
+        assert!(says.iter().all(|it| refused.contains(it)), "{refused}");
+    }
 }

@@ -210,7 +210,7 @@ fn parse_cell_counts(given: &str) -> Result<[usize; 2], String> {
 /// An error together with the option that caused it.
 fn refusal_with_option(error: TraceError) -> Refusal {
     match error {
-        TraceError::Vary { .. } => format!("--vary {error}").into(),
+        TraceError::Vary { .. } | TraceError::End { .. } => format!("--vary {error}").into(),
         error => error.into(),
     }
 }

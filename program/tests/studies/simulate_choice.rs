@@ -106,6 +106,23 @@ fn internal_damping_is_left_to_the_semi_implicit_method() {
     assert!(explicit.seconds > 10.0 * semi_implicit.seconds, "{choice}");
 }
 
+/// What is told before a motion is what the choice of its method compared: with tissue, which takes most of a step,
+/// and without.
+#[test]
+fn the_duration_told_beforehand_counts_tissue() {
+    for (name, tissue) in [("study/plate", true), ("motion/gust", false)] {
+        let leaf = scenario(name, "dynamics.duration=0.2");
+        let simulation = Simulation::new(&leaf, &Options::default()).unwrap();
+        let [_, semi_implicit] = simulation.choice().costs.unwrap();
+        assert_eq!(simulation.choice().scheme, Scheme::SemiImplicit, "{name}");
+        let (steps, seconds) = simulation.expected().unwrap();
+        close(name, steps, semi_implicit.steps, 1e-9 * steps);
+        close(name, seconds, semi_implicit.seconds, 1e-9 * seconds);
+        let step = seconds / steps / simulation.segments() as f64;
+        assert_eq!(step > 5e-5, tissue, "{name}: {step:e} a segment");
+    }
+}
+
 /// A request, and what only one of the methods can do, is not a matter of costs.
 #[test]
 fn what_decides_before_costs() {
@@ -177,7 +194,7 @@ fn the_report_and_the_summary_say_why() {
     let place = Workplace::new();
     let short = "simulate leaf.toml --segments 16 --set dynamics.duration=1";
     let run = place.ok(short);
-    let line = "\n  choice   it costs less: some ";
+    let line = "\n  choice   it costs less on the first grid: some ";
     run.says(&["method explicit\n", line, " by the semi-implicit one\n"]);
     let of = |arguments: &str| -> Value {
         let run = place.ok(format!("{short} --json {arguments}"));
@@ -187,7 +204,7 @@ fn the_report_and_the_summary_say_why() {
     assert_eq!(choice["reason"], "cost");
     contains(
         choice["explanation"].text(),
-        &["it costs less: some ", " steps in "],
+        &["it costs less on the first grid: some ", " steps in "],
     );
     assert!(choice["explicit"]["steps"].number() > 100.0);
     assert_eq!(choice["explicit"]["at_least"], false);

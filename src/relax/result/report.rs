@@ -17,7 +17,7 @@ use crate::relax::result::forces::Stresses;
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::rotation::{Pose, align_quaternion_sign};
 use crate::scenario::{
-    Grip, LARGEST_PLAUSIBLE_STRETCH, Scenario, Tissue, held_tip_out_of_reach,
+    Grip, LARGEST_PLAUSIBLE_STRETCH, Profile, Rod, Scenario, Tissue, held_tip_out_of_reach,
     plausibility_warnings, probable_obstacle_to_rest,
 };
 use crate::shape::{
@@ -484,13 +484,22 @@ fn obstacle_to_rest(
     ];
     let largest = named.iter().fold(0.0_f64, |m, (size, _)| m.max(*size));
     let counts = |(size, _): &&(f64, _)| *size > NAMED_LOAD_FRACTION * largest;
+    // Tissue that keeps its length strains veins that grow, whatever their loads.
+    let growth = strains_by_growth(problem.leaf.scenario()).then_some("the growth by rest.stretch");
+    let loads = named.iter().filter(counts).map(|(_, name)| *name);
     Some(RestObstacle::Loads {
         reached: reached.position,
-        loads: named.iter().filter(counts).map(|(_, name)| *name).collect(),
+        loads: growth.into_iter().chain(loads).collect(),
         stiffness: softest,
         vein,
         may_shoot: moment.is_some() && problem.leaf.tip_support.is_none(),
     })
+}
+
+/// Whether veins have grown, or shrunk, and the tissue between them has not.
+fn strains_by_growth(scenario: &Scenario) -> bool {
+    let grown = |rod: &Rod| rod.rest_stretch != Profile::Constant(1.0);
+    !scenario.tissue_grown && scenario.tissue.is_some() && scenario.rods.iter().any(grown)
 }
 
 /// The implausible properties of a leaf at rest, first those of its scenario.

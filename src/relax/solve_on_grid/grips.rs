@@ -11,7 +11,7 @@ use crate::leaf::{BucklingMode, DiscreteLeaf, GrippedNode, SpringEnd, State, Sys
 use crate::newton::{DefiniteSolver, EquilibriumFailure, NewtonEquations, NewtonIteration};
 use crate::relax::log::WorkLog;
 use crate::relax::path::{Event, StabilityLoss, Stage};
-use crate::relax::plan::RelaxationProblem;
+use crate::relax::plan::{RelaxationProblem, WORK};
 use crate::relax::saddle;
 use crate::relax::solve_on_grid::start::{FAR_FROM_REST, GridRelaxation};
 use crate::rotation;
@@ -122,8 +122,7 @@ pub fn move_grips(
     });
     let SupportContinuation { held, events, .. } = continuation;
     let (mut state, near_rest, moved) = (held.state, held.near_rest, held.left_convex_valley);
-    effort.node_evaluations +=
-        leaf.rods() * leaf.segments() * (effort.work.force_evaluations - begun);
+    effort.node_evaluations += WORK.nodes(leaf) * (effort.work.force_evaluations - begun);
     leaf.place_held_nodes(&mut state);
     HeldState {
         state,

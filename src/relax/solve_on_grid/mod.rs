@@ -317,7 +317,7 @@ fn solve_semi_implicit(
     let convex_only = problem.whole_leaf.is_some()
         || problem.valley != ValleyPolicy::MayLeave
         || problem.too_coarse(leaf.segments());
-    let nodes = leaf.rods() * leaf.segments();
+    let nodes = WORK.nodes(&leaf);
     let granted = (WORK.guaranteed * WORK.coarse_segments / leaf.segments())
         .clamp(WORK.guaranteed_on_any_grid, WORK.guaranteed);
     let left = WORK

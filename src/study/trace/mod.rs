@@ -15,7 +15,7 @@ use crate::branch::{
 use crate::leaf::{BucklingMode, Grid, Leaf, NodalField, displacement_part};
 use crate::memory;
 use crate::relax::{
-    Equilibrium, Options, RelaxError, SemiImplicit, check_segments, relax,
+    Equilibrium, Options, RelaxError, SemiImplicit, check_natural_tips, check_segments, relax,
     without_wind_or_followers,
 };
 use crate::run::{Instant, Limit, RefusedOption};
@@ -25,7 +25,7 @@ use crate::study::remark::{BranchRemark, TraceRemark};
 use crate::study::trace::result::{ForceDisplacementLine, LoadedTip, TraceUntil};
 pub use crate::study::trace::result::{PointKind, Trace, TraceBranch, TracePoint};
 use crate::study::trace::without_potential::trace_without_potential;
-use crate::study::vary::{BaseScenario, ParameterSweep};
+use crate::study::vary::{BaseScenario, ParameterKeys, ParameterSweep};
 use crate::study::{VariableTarget, VaryError};
 use glam::DVec3;
 use serde::Serializer;
@@ -77,9 +77,34 @@ pub enum TraceError {
     /// The request for the first equilibrium cannot be met.
     #[error(transparent)]
     Relax(#[from] RelaxError),
+    /// No leaf at an end of the range can come to rest.
+    #[error("{keys} = {value}: {why}")]
+    End {
+        /// What varies.
+        keys: ParameterKeys,
+        /// The value at that end, as it is written.
+        value: String,
+        /// Why.
+        why: RelaxError,
+    },
 }
 
 impl TraceRequest {
+    /// Refuses a range at an end of which there is no scenario, or none whose leaf can come to rest: what the
+    /// branch would meet there is known before it is followed.
+    fn check_ends(&self) -> Result<(), TraceError> {
+        let keys = &self.vary.keys;
+        for value in self.vary.ends() {
+            let there = self.base.scenario_with_values(&[(keys, value)])?;
+            check_natural_tips(&there.scenario).map_err(|why| TraceError::End {
+                keys: keys.clone(),
+                value: keys.text(value),
+                why,
+            })?;
+        }
+        Ok(())
+    }
+
     /// Validates the request before it is run.
     pub(super) fn validate(&self) -> Result<(), TraceError> {
         let keys = &self.vary.keys;
@@ -221,9 +246,7 @@ fn trace_with_points_from(
         let at = request.base.scenario_with_values(&[(keys, value)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
     };
-    for value in ends {
-        request.base.scenario_with_values(&[(keys, value)])?;
-    }
+    request.check_ends()?;
     let family = LeafFamily::new(&make, ends, vary.log);
     let family = family.map_err(|out| TraceError::Vary(format!("{keys}: {out}")))?;
     let family = family.with_limit(request.limit.clone());

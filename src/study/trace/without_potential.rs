@@ -53,9 +53,7 @@ pub(super) fn trace_without_potential(
     let clock = Instant::now();
     let (keys, vary) = (&request.vary.keys, &request.vary);
     let ends = vary.ends();
-    for value in ends {
-        request.base.scenario_with_values(&[(keys, value)])?;
-    }
+    request.check_ends()?;
     let make = |[value]: [f64; 1]| -> Result<Scenario, String> {
         let at = request.base.scenario_with_values(&[(keys, value)]);
         Ok(at.map_err(|refused| refused.to_string())?.scenario)
