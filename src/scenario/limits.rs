@@ -387,21 +387,13 @@ fn check_masses(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
         return Ok(());
     };
     let (scale, time) = (scenario.scale(), scenario.natural_time());
-    let unit = |key: Key| scale.unit(key, time);
-    let dynamics = &scenario.dynamics;
-    LIMITS
-        .density
-        .check_profiles(density, &dynamics.density, unit(Key::Density))?;
+    let [of_mass, of_inertia] = [&LIMITS.density, &LIMITS.rotary_inertia];
+    let units = [Key::Density, Key::RotaryInertia].map(|key| scale.unit(key, time));
+    of_mass.check_profiles(density, &scenario.dynamics.density, units[0])?;
     for axis in 0..2 {
-        let about_axis = dynamics
-            .rotary_inertia
-            .iter()
-            .map(|both| both[axis].clone());
-        let about_axis: Vec<Profile> = about_axis.collect();
-        let unit = unit(Key::RotaryInertia);
-        LIMITS
-            .rotary_inertia
-            .check_profiles(size, &about_axis, unit)?;
+        let inertia = scenario.dynamics.rotary_inertia.iter();
+        let about_axis: Vec<Profile> = inertia.map(|both| both[axis].clone()).collect();
+        of_inertia.check_profiles(size, &about_axis, units[1])?;
     }
     Ok(())
 }
