@@ -205,9 +205,9 @@ prop_compose! {
         let dynamics = &mut leaf.dynamics;
         let squared = radius.iter().map(|radius| 0.25 * radius * radius);
         let both = density.iter().zip(squared);
-        // Flat sections, too.
         let inertia = |(density, squared): (&Profile, f64)| {
-            [density.scaled(squared), density.scaled(0.4 * squared)]
+            let about_both = density.scaled(squared);
+            [about_both.clone(), about_both]
         };
         dynamics.rotary_inertia = both.map(inertia).collect();
         dynamics.density = density;
