@@ -14,6 +14,7 @@ from leaf import Refused, append, at_stations, sample
 KEYS = [
     "density",
     "rotary_inertia",
+    "rotary_inertia_3",
     "section_radius",
     "external_damping",
     "internal_damping",
@@ -88,17 +89,23 @@ class Dynamics:
         return value
 
     def rotary_inertia(self, longest):
-        """A given one is that of a round section: twice as much about d1."""
+        """That about d1 is the sum of those about d2 and d3."""
         given = self.leaf.document.get("dynamics", {})
+        if "rotary_inertia_3" in given and "rotary_inertia" not in given:
+            raise Refused("dynamics.rotary_inertia_3: dynamics.rotary_inertia is wanted, too")
         if "rotary_inertia" in given and "section_radius" in given:
             raise Refused("dynamics.rotary_inertia, dynamics.section_radius: one of them is wanted")
         if "section_radius" in given:
-            bending = self.density * self.number("section_radius", None, above=0.0) ** 2 / 4.0
+            about_2 = about_3 = self.density * self.number("section_radius", None, above=0.0) ** 2 / 4.0
         elif "rotary_inertia" in given:
-            bending = self.number("rotary_inertia", None, above=0.0)
+            about_2 = about_3 = self.number("rotary_inertia", None, above=0.0)
+            if "rotary_inertia_3" in given:
+                about_3 = self.number("rotary_inertia_3", None, above=0.0)
+        elif "density" in given and "section" in self.leaf.document:
+            raise Refused("section with dynamics.density: give dynamics.rotary_inertia, too")
         else:
             return np.full(3, self.density * (longest / 10.0) ** 2)
-        return np.array([2.0, 1.0, 1.0]) * bending
+        return np.array([about_2 + about_3, about_2, about_3])
 
     def schedule(self, key, at_rest):
         """A load in time, in place of that at rest."""

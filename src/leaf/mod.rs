@@ -263,7 +263,7 @@ impl Leaf {
             rotary_inertia,
             ..
         } = &scenario.dynamics;
-        let masses = density.iter().chain(rotary_inertia);
+        let masses = density.iter().chain(rotary_inertia.iter().flatten());
         let masses = masses.flat_map(Profile::kinks).copied();
         let layers = clamp_layer_edges(&scenario);
         let kinks = distinct_places(scenario.kinks().into_iter(), masses.chain(layers));

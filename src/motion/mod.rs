@@ -289,11 +289,7 @@ pub fn measure(
     for (j, i) in leaf.rod_index_pairs(0..=n) {
         let (k, inertia) = (state.base(j) + i, physics.inertia(leaf, j, i));
         let Velocity { angular, linear } = velocity[k];
-        let spin = angular.dot(state.q[k] * DVec3::X);
-        let turning = angular.length_squared() + inertia.polar_excess * spin * spin;
-        energy.kinetic += 0.5 * inertia.mass * linear.length_squared();
-        energy.kinetic += 0.5 * inertia.transverse * turning;
-        energy.kinetic += inertia.off_axis_energy(state.q[k], [angular, linear]);
+        energy.kinetic += inertia.kinetic_energy(state.q[k], [angular, linear]);
         let potential = leaf.load(state, j, i).energy;
         let stretch = leaf.coupling_energy(state, j, i);
         energy.coupling += stretch;
@@ -337,10 +333,11 @@ fn unresolved_energy(leaf: &DiscreteLeaf, physics: &Physics, time: f64, h: f64) 
         let inertia = physics.inertia(leaf, it.rod, it.node);
         let moment = it.load.moment + it.load.dead_moment;
         energy += it.load.force.length_squared() / inertia.mass;
-        energy += moment.length_squared() / inertia.transverse;
+        energy += moment.length_squared() / inertia.principal.min_element();
     }
     for it in leaf.dead_moments_under(loads) {
-        energy += it.moment.length_squared() / physics.inertia(leaf, 0, it.node).transverse;
+        let inertia = physics.inertia(leaf, 0, it.node);
+        energy += it.moment.length_squared() / inertia.principal.min_element();
     }
     0.5 * h * h * energy
 }

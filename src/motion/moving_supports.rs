@@ -302,13 +302,7 @@ impl MovingSupports {
             } else {
                 DVec3::ZERO
             };
-            let turning = spin.dot(of_node.tensor(it.now.rotation) * spin);
-            let mut energy = 0.5 * (of_node.mass * v.linear.length_squared() + turning);
-            if of_node.is_off_axis() {
-                let first_moment = of_node.first_moment(it.now.rotation);
-                energy += first_moment.dot(v.linear.cross(spin));
-            }
-            energy
+            of_node.kinetic_energy(it.now.rotation, [spin, v.linear])
         };
         self.nodes.iter().map(energy).sum()
     }

@@ -21,10 +21,8 @@ use std::ops::Add;
 pub struct Inertia {
     /// Mass.
     pub mass: f64,
-    /// Moment of inertia about d2 and d3.
-    pub transverse: f64,
-    /// Relative excess of the moment of inertia about d1.
-    pub polar_excess: f64,
+    /// Moments of inertia about d1, d2 and d3, without those of masses off the axis.
+    pub principal: DVec3,
     /// Masses off the axis; `None` without any.
     pub off_axis: Option<OffAxisMass>,
 }
@@ -68,17 +66,24 @@ impl Add for OffAxisMass {
 }
 
 impl Inertia {
-    /// Moment of inertia about d1.
-    pub fn polar(&self) -> f64 {
-        self.transverse * (1.0 + self.polar_excess)
+    /// By how much the moments of inertia about d1 and d3 exceed that about d2. A node that has the same about d2 and d3
+    /// needs no d3.
+    #[inline]
+    fn excess(&self) -> [f64; 2] {
+        let DVec3 { x, y, z } = self.principal;
+        [x - y, z - y]
     }
 
     /// Inertia tensor of the node rotated by `rotation`, along the lab axes.
     #[inline]
     pub fn tensor(&self, rotation: DQuat) -> DMat3 {
-        let d1 = rotation * DVec3::X;
-        let excess = self.polar_excess * self.transverse;
-        let on_axis = DMat3::from_diagonal(DVec3::splat(self.transverse)) + outer(d1, d1) * excess;
+        let ([excess_1, excess_3], d1) = (self.excess(), rotation * DVec3::X);
+        let mut on_axis = DMat3::from_diagonal(DVec3::splat(self.principal.y));
+        on_axis += outer(d1, d1) * excess_1;
+        if excess_3 != 0.0 {
+            let d3 = rotation * DVec3::Z;
+            on_axis += outer(d3, d3) * excess_3;
+        }
         match &self.off_axis {
             None => on_axis,
             Some(off_axis) => on_axis + off_axis.tensor_along_lab_axes(rotation),
@@ -132,9 +137,20 @@ impl Inertia {
         }
     }
 
+    /// The kinetic energy of a node with these velocities (w, u).
+    pub fn kinetic_energy(&self, rotation: DQuat, [spin, velocity]: [DVec3; 2]) -> f64 {
+        let ([excess_1, excess_3], about_1) = (self.excess(), spin.dot(rotation * DVec3::X));
+        let mut turning = self.principal.y * spin.length_squared() + excess_1 * about_1 * about_1;
+        if excess_3 != 0.0 {
+            turning += excess_3 * spin.dot(rotation * DVec3::Z).powi(2);
+        }
+        let on_axis = 0.5 * (self.mass * velocity.length_squared() + turning);
+        on_axis + self.off_axis_energy(rotation, [spin, velocity])
+    }
+
     /// What masses off the axis add to the kinetic energy of a node with these velocities (w, u): s . (u x w) + w . J w/2
     /// with their own J.
-    pub fn off_axis_energy(&self, rotation: DQuat, [spin, velocity]: [DVec3; 2]) -> f64 {
+    fn off_axis_energy(&self, rotation: DQuat, [spin, velocity]: [DVec3; 2]) -> f64 {
         let Some(off_axis) = &self.off_axis else {
             return 0.0;
         };
@@ -346,13 +362,13 @@ impl Physics {
         let preset = Dynamics::default_for(&leaf.scenario().rods);
         let assumed = AssumedMotion {
             uniform_density: given.density == preset.density,
-            no_rotary_inertia: given.polar_inertia == PolarInertia::Excess(0.0),
+            no_rotary_inertia: given.polar_inertia == PolarInertia::Same,
             no_damping: given.assumes_damping && given.internal_damping == 0.0,
         };
         let mut physics = Physics::new(leaf);
         if assumed.no_rotary_inertia {
-            let none = vec![Profile::Constant(0.0); given.density.len()];
-            physics.dynamics.rotary_inertia = none;
+            let none = [0.0; 2].map(Profile::Constant);
+            physics.dynamics.rotary_inertia = vec![none; given.density.len()];
         }
         if given.assumes_damping {
             physics.damping = 0.0;
@@ -459,15 +475,15 @@ impl Physics {
         let beside = beside.filter(|it| it.offset != DVec3::ZERO);
         let off_axis = beside.map(OffAxisMass::of_point).reduce(OffAxisMass::add);
         let dynamics = &self.dynamics;
-        let transverse = around(&dynamics.rotary_inertia[j]);
-        let polar_excess = match &dynamics.polar_inertia {
-            PolarInertia::Excess(excess) => *excess,
-            PolarInertia::PerLength(polar) => around(&polar[j]) / transverse - 1.0,
+        let given = &dynamics.rotary_inertia[j];
+        let [about_2, about_3] = given.each_ref().map(|it| length * around(it) / rotary);
+        let polar = match dynamics.polar_inertia {
+            PolarInertia::Sum => about_2 + about_3,
+            PolarInertia::Same => about_2,
         };
         Inertia {
             mass: length * around(&dynamics.density[j]) / self.density_unit + on_points,
-            transverse: length * transverse / rotary,
-            polar_excess,
+            principal: DVec3::new(polar, about_2, about_3),
             off_axis,
         }
     }

@@ -204,7 +204,7 @@ pub fn rest_scenario(
         rest.blade = None;
         let dynamics = &mut rest.dynamics;
         let densities = dynamics.density.iter_mut();
-        for profile in densities.chain(&mut dynamics.rotary_inertia) {
+        for profile in densities.chain(dynamics.rotary_inertia.iter_mut().flatten()) {
             *profile = sampled(profile, &places);
         }
     }

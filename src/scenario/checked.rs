@@ -463,12 +463,14 @@ impl Scenario {
                 rod.force_stiffness[axis] = section.profile(Property::Force(axis));
             }
             let dynamics = &mut self.dynamics;
-            for (property, of_vein) in [
-                (Property::Density, &mut dynamics.density[vein]),
-                (Property::RotaryInertia, &mut dynamics.rotary_inertia[vein]),
-            ] {
-                if *of_vein == before.profile(property) {
-                    *of_vein = section.profile(property);
+            let density_before = dynamics.density[vein].clone();
+            if density_before == before.profile(Property::Density) {
+                dynamics.density[vein] = section.profile(Property::Density);
+            }
+            for (axis, of_vein) in dynamics.rotary_inertia[vein].iter_mut().enumerate() {
+                let gyration = Property::SquaredGyration(axis);
+                if *of_vein == density_before.times(&before.profile(gyration)) {
+                    *of_vein = dynamics.density[vein].times(&section.profile(gyration));
                 }
             }
         }

@@ -13,7 +13,7 @@ use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 use crate::scenario::section::{HollowSection, Property, Section, SectionOutline, ShearLaw};
 use crate::scenario::supports::Grip;
-use crate::scenario::veins::{Rod, Tissue};
+use crate::scenario::veins::{Rod, StiffnessSource, Tissue};
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -23,8 +23,6 @@ struct SerializedSections<'a> {
     sections: &'a [Arc<Section>],
     /// Whether they give the densities, too.
     density: bool,
-    /// Whether they give the rotary inertia, too.
-    rotary_inertia: bool,
 }
 
 /// An entry of the format with its value.
@@ -325,17 +323,35 @@ impl Scenario {
     fn dynamics_value(&self, key: Key, sections: Option<&SerializedSections>) -> Option<Value> {
         let dynamics = &self.dynamics;
         Some(match key {
-            Key::Density | Key::RotaryInertia if self.has_blade_mass() => return None,
+            Key::Density if self.has_blade_mass() => return None,
             Key::Density if sections.is_some_and(|it| it.density) => return None,
             // If given, it would have a weight.
             Key::Density if self.weighs_points_only => return None,
-            Key::RotaryInertia if sections.is_some_and(|it| it.rotary_inertia) => return None,
-            Key::Density => quantity_value(dynamics.density.iter()),
-            // If given, it would be larger about d1.
-            Key::RotaryInertia if dynamics.polar_inertia == PolarInertia::Excess(0.0) => {
+            // If given, rotary inertia would follow from it and the source of the stiffnesses.
+            Key::Density
+                if dynamics.polar_inertia == PolarInertia::Same
+                    && (sections.is_some() || self.blade.is_some()) =>
+            {
                 return None;
             }
-            Key::RotaryInertia => quantity_value(dynamics.rotary_inertia.iter()),
+            Key::Density => quantity_value(dynamics.density.iter()),
+            // If given, it would be larger about d1.
+            Key::RotaryInertia | Key::RotaryInertia3
+                if dynamics.polar_inertia == PolarInertia::Same
+                    || self.rotary_inertia_follows_from_source(sections) =>
+            {
+                return None;
+            }
+            Key::RotaryInertia => {
+                quantity_value(dynamics.rotary_inertia.iter().map(|[about_2, _]| about_2))
+            }
+            Key::RotaryInertia3 => {
+                let mut both = dynamics.rotary_inertia.iter();
+                if both.all(|[about_2, about_3]| about_2 == about_3) {
+                    return None;
+                }
+                quantity_value(dynamics.rotary_inertia.iter().map(|[_, about_3]| about_3))
+            }
             // If given, it would count for the verdict on small motions.
             Key::ExternalDamping
                 if dynamics.assumes_damping
@@ -393,12 +409,18 @@ impl Scenario {
             pairs.all(|(profile, section)| *profile == section.profile(property))
         };
         let density = give(&self.dynamics.density, Property::Density);
-        let inertia = give(&self.dynamics.rotary_inertia, Property::RotaryInertia);
-        Some(SerializedSections {
-            sections,
-            density,
-            rotary_inertia: density && inertia,
-        })
+        Some(SerializedSections { sections, density })
+    }
+
+    /// Whether the rotary inertia is that of the densities and the sections, or the strips of a blade.
+    fn rotary_inertia_follows_from_source(&self, sections: Option<&SerializedSections>) -> bool {
+        let source = match (&self.blade, sections) {
+            (Some(blade), _) => StiffnessSource::from_blade(blade.clone()),
+            (None, Some(it)) => StiffnessSource::Sections(it.sections.to_vec()),
+            (None, None) => return false,
+        };
+        let dynamics = &self.dynamics;
+        source.rotary_inertia(&dynamics.density).as_ref() == Some(&dynamics.rotary_inertia)
     }
 }
 

@@ -246,7 +246,8 @@ fn check_magnitudes(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()
     } = &scenario.dynamics;
     for (rod, it) in scenario.rods.iter().enumerate() {
         let stiffness = it.couple_stiffness.iter().chain(&it.force_stiffness);
-        for profile in stiffness.chain([&density[rod], &rotary_inertia[rod]]) {
+        let masses = rotary_inertia[rod].iter().chain([&density[rod]]);
+        for profile in stiffness.chain(masses) {
             is_moderate(size.entry(rod), profile)?;
         }
     }
@@ -359,6 +360,7 @@ fn check_dynamics(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> 
     for (key, limit) in [
         (Key::Density, &LIMITS.density),
         (Key::RotaryInertia, &LIMITS.rotary_inertia),
+        (Key::RotaryInertia3, &LIMITS.rotary_inertia),
         (Key::SectionRadius, &LIMITS.section_radius),
         (Key::ExternalDamping, &LIMITS.external_damping),
         (Key::InternalDamping, &LIMITS.internal_damping),
@@ -379,23 +381,19 @@ fn check_dynamics(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> 
 
 /// Checks masses that follow from sections or a blade.
 fn check_masses(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
-    let mass = [Key::MassDensity, Key::BladeMassDensity];
+    let mass = [Key::MassDensity, Key::BladeMassDensity, Key::Density];
     let mass = mass.into_iter().find_map(|key| entries.given_value(key));
     let (Some(size), Some(density)) = (section::size_entry(entries), mass) else {
         return Ok(());
     };
     let (scale, time) = (scenario.scale(), scenario.natural_time());
-    let dynamics = &scenario.dynamics;
-    for (item, key, limit, profiles) in [
-        (density, Key::Density, &LIMITS.density, &dynamics.density),
-        (
-            size,
-            Key::RotaryInertia,
-            &LIMITS.rotary_inertia,
-            &dynamics.rotary_inertia,
-        ),
-    ] {
-        limit.check_profiles(item, profiles, scale.unit(key, time))?;
+    let [of_mass, of_inertia] = [&LIMITS.density, &LIMITS.rotary_inertia];
+    let units = [Key::Density, Key::RotaryInertia].map(|key| scale.unit(key, time));
+    of_mass.check_profiles(density, &scenario.dynamics.density, units[0])?;
+    for axis in 0..2 {
+        let inertia = scenario.dynamics.rotary_inertia.iter();
+        let about_axis: Vec<Profile> = inertia.map(|both| both[axis].clone()).collect();
+        of_inertia.check_profiles(size, &about_axis, units[1])?;
     }
     Ok(())
 }

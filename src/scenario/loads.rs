@@ -403,14 +403,13 @@ words! {
 }
 
 /// The moment of inertia of rods about d1.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PolarInertia {
-    /// It is larger than that about d2 and d3 by this part of it: 1 if a section is given, as for every
-    /// round one; 0 otherwise, where a vein turns with its strip of blade and has the same inertia about all
-    /// axes, as in the relaxation ([`crate::relax`]).
-    Excess(f64),
-    /// Per unit reference length, one per rod: of veins of a blade, that of their strips.
-    PerLength(Vec<Profile>),
+    /// The sum of those about d2 and d3, as of every plane section.
+    Sum,
+    /// That about d2, where no inertia is given: a vein turns with its strip of blade and has the same inertia about
+    /// all axes, as in the relaxation ([`crate::relax`]).
+    Same,
 }
 
 /// How a leaf moves. All quantities are in the units of the scenario, with
@@ -420,9 +419,9 @@ pub enum PolarInertia {
 pub struct Dynamics {
     /// Mass per unit reference length, one per rod; positive.
     pub density: Vec<Profile>,
-    /// rho I, the moment of inertia per unit reference length about d2 and
-    /// about d3, one per rod; positive.
-    pub rotary_inertia: Vec<Profile>,
+    /// rho I2 and rho I3, the moments of inertia per unit reference length about d2 and
+    /// about d3, of each rod; positive.
+    pub rotary_inertia: Vec<[Profile; 2]>,
     /// The moment of inertia about d1.
     pub polar_inertia: PolarInertia,
     /// Viscous force per unit reference length and velocity. Rotation is damped
@@ -518,10 +517,10 @@ impl Dynamics {
         let time = natural_time_unit(scale, &density);
         let duration = DEFAULT_MOTION.duration * time;
         let radius = Profile::Constant(DEFAULT_MOTION.radius * scale.length);
-        let inertia = |density| round_inertia(density, &radius);
+        let inertia = |density| both_axes(round_inertia(density, &radius));
         Dynamics {
             rotary_inertia: density.iter().map(inertia).collect(),
-            polar_inertia: PolarInertia::Excess(0.0),
+            polar_inertia: PolarInertia::Same,
             external_damping: critical_damping(&density, time),
             assumes_damping: true,
             density,
@@ -571,6 +570,11 @@ fn round_inertia(density: &Profile, radius: &Profile) -> Profile {
     }
 }
 
+/// The rotary inertia of a section that has the same about d2 and d3.
+fn both_axes(inertia: Profile) -> [Profile; 2] {
+    [inertia.clone(), inertia]
+}
+
 /// Reads `[dynamics]`, for rods under this gravity in time, a tip force and a tip moment.
 pub(super) fn read_dynamics(
     entries: &Entries,
@@ -593,6 +597,7 @@ pub(super) fn read_dynamics(
         }
         None => of_mass(Property::Density),
     };
+    let has_mass = density.is_some();
     let preset = match density {
         Some(density) => Dynamics::with_density(rods, density),
         None => Dynamics::default_for(rods),
@@ -608,15 +613,11 @@ pub(super) fn read_dynamics(
         None => Ok(default),
     };
     let duration = number(Key::Duration, preset.duration)?;
-    let round = PolarInertia::Excess(1.0);
     let given = read_rotary_inertia(entries, &preset.density)?;
-    let (rotary_inertia, polar_inertia) = match (given, of_mass(Property::RotaryInertia)) {
-        (Some(given), _) => (given, round),
-        (None, Some(of_mass)) => {
-            let own = source.polar_inertia().map(PolarInertia::PerLength);
-            (of_mass, own.unwrap_or(round))
-        }
-        (None, None) => (preset.rotary_inertia, preset.polar_inertia),
+    let of_section = || source.rotary_inertia(&preset.density).filter(|_| has_mass);
+    let (rotary_inertia, polar_inertia) = match given.or_else(of_section) {
+        Some(inertia) => (inertia, PolarInertia::Sum),
+        None => (preset.rotary_inertia, preset.polar_inertia),
     };
     let external_damping = number(Key::ExternalDamping, preset.external_damping)?;
     let internal_damping = entries.value_or_default(Key::InternalDamping)?.number()?;
@@ -653,30 +654,40 @@ pub(super) fn read_dynamics(
     })
 }
 
+/// The rotary inertia about d2 and d3, if it is given.
 fn read_rotary_inertia(
     entries: &Entries,
     density: &[Profile],
-) -> ScenarioResult<Option<Vec<Profile>>> {
+) -> ScenarioResult<Option<Vec<[Profile; 2]>>> {
     let quantity = |item: EntryValue| item.profile_per_rod(density.len());
-    let inertia = entries
-        .given_value(Key::RotaryInertia)
-        .map(quantity)
-        .transpose()?;
-    let Some(item) = entries.given_value(Key::SectionRadius) else {
-        return Ok(inertia);
+    let both_given = [Key::RotaryInertia, Key::RotaryInertia3].map(|key| entries.given_value(key));
+    let [about_2, about_3] = both_given;
+    if let Some(item) = about_3 {
+        item.refuse_unless(
+            about_2.is_some(),
+            "is the inertia about d3 alone: give dynamics.rotary_inertia, that about d2, too",
+        )?;
+    }
+    if let Some(item) = entries.given_value(Key::SectionRadius) {
+        item.refuse_unless(
+            about_2.is_none(),
+            "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
+             leave one of them out",
+        )?;
+        let radius = quantity(item)?;
+        let round = density.iter().zip(&radius);
+        let inertia = round.map(|(density, radius)| both_axes(round_inertia(density, radius)));
+        return Ok(Some(inertia.collect()));
+    }
+    let Some(about_2) = about_2.map(quantity).transpose()? else {
+        return Ok(None);
     };
-    item.refuse_unless(
-        inertia.is_none(),
-        "dynamics.rotary_inertia is given, too, and is density section_radius^2/4: \
-         leave one of them out",
-    )?;
-    let radius = quantity(item)?;
-    let round = density.iter().zip(&radius);
-    Ok(Some(
-        round
-            .map(|(density, radius)| round_inertia(density, radius))
+    Ok(Some(match about_3.map(quantity).transpose()? {
+        Some(about_3) => (about_2.into_iter().zip(about_3))
+            .map(|(about_2, about_3)| [about_2, about_3])
             .collect(),
-    ))
+        None => about_2.into_iter().map(both_axes).collect(),
+    }))
 }
 
 fn read_output_interval(item: EntryValue, duration: f64) -> ScenarioResult<f64> {
@@ -737,8 +748,9 @@ mod tests {
             let close = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-12;
             assert!(close(density, bending / length.powi(4)));
             assert!(close(dynamics.external_damping, 2.0 * 3.516 * density));
-            let inertia = dynamics.rotary_inertia[2].at(0.5);
-            assert!(close(inertia, 0.01 * density * length * length));
+            for inertia in &dynamics.rotary_inertia[2] {
+                assert!(close(inertia.at(0.5), 0.01 * density * length * length));
+            }
         }
     }
 

@@ -3,7 +3,7 @@
 
 use crate::run::remarks;
 use crate::scenario::checked::Scenario;
-use crate::scenario::loads::{Dynamics, PolarInertia};
+use crate::scenario::loads::Dynamics;
 use crate::scenario::supports::Clamp;
 use crate::scenario::veins::Rod;
 use glam::DVec3;
@@ -29,8 +29,6 @@ struct PlausibleRanges {
     /// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
     /// a turn that are multiples of this.
     degree_multiple: f64,
-    /// The radius of gyration that is assumed may be larger than that of known sections by this factor.
-    gyration_ratio: f64,
 }
 
 const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
@@ -40,7 +38,6 @@ const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
     weight_contradiction: 10.0,
     weight_tolerance: 0.01,
     degree_multiple: 15.0,
-    gyration_ratio: 2.0,
 };
 
 /// A unit of length, and the acceleration of gravity in it per second squared.
@@ -193,15 +190,6 @@ remarks! {
             /// Mass per volume, in kg/m³.
             density: f64,
         } = "lighter-than-air",
-        /// Inertia of rotation that is assumed although sections are known.
-        #[error(
-            "dynamics.density without dynamics.rotary_inertia: sections turn with the radius of gyration L/10, {} times that of [section]; give section.mass_density in place of dynamics.density, or the rotary inertia, too",
-            four_digits(*.times)
-        )]
-        AssumedRotaryInertia {
-            /// The assumed radius of gyration over the larger one of the section.
-            times: f64,
-        } = "assumed-rotary-inertia",
         /// A material stiffer than any.
         #[error(
             "{key} is {} GPa in the units of the scenario, and diamond, the stiffest material, has 1220; check it and its unit: with lengths in {length} and forces in {force}, 1 GPa is {}",
@@ -298,7 +286,6 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
     let materials = [
         denser_than_anything(scenario),
         lighter_than_air(scenario),
-        assumed_rotary_inertia(scenario),
         stiffer_than_diamond(scenario),
     ];
     let all = angles.into_iter().chain(lengths).chain(materials);
@@ -460,21 +447,6 @@ fn lighter_than_air(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let NamedDensity { key, value, unit } = NamedDensity::of(scenario)?;
     let density = unit * value;
     (0.0 < density && density < AIR).then_some(PlausibilityWarning::LighterThanAir { key, density })
-}
-
-/// The radius of gyration that is assumed, where it is far from that of known sections.
-fn assumed_rotary_inertia(scenario: &Scenario) -> Option<PlausibilityWarning> {
-    let dynamics = &scenario.dynamics;
-    let given = dynamics.density != Dynamics::default_for(&scenario.rods).density;
-    if !given || dynamics.polar_inertia != PolarInertia::Excess(0.0) {
-        return None;
-    }
-    // That of a rectangle, of which no section has much more.
-    let gyration = scenario.radii.largest_side(0)? / 12.0_f64.sqrt();
-    let assumed = (dynamics.rotary_inertia[0].at(0.5) / dynamics.density[0].at(0.5)).sqrt();
-    let times = assumed / gyration;
-    (times > PLAUSIBLE.gyration_ratio)
-        .then_some(PlausibilityWarning::AssumedRotaryInertia { times })
 }
 
 /// A material stiffer than any, where units are named.

@@ -265,6 +265,27 @@ impl Profile {
         }
     }
 
+    /// The product of two profiles.
+    pub(super) fn times(&self, other: &Profile) -> Profile {
+        match (self, other) {
+            (Profile::Constant(factor), profile) | (profile, Profile::Constant(factor)) => {
+                profile.scaled(*factor)
+            }
+            _ => {
+                let product = ProfileProduct::new([self.clone(), other.clone()]);
+                Profile::Derived(DerivedProfile::new(Arc::new(product), 0, 1.0))
+            }
+        }
+    }
+
+    /// Equal parts of the length over which an integral is summed up.
+    fn integration_panels(&self) -> usize {
+        match self {
+            Profile::Derived(derived) => derived.source.integration_panels(),
+            _ => 1,
+        }
+    }
+
     /// Folds values that include the extremes.
     fn fold_extremes(&self, start: f64, with: impl Fn(f64, f64) -> f64) -> f64 {
         match self {
@@ -279,6 +300,75 @@ impl Profile {
                 values.into_iter().fold(start, with)
             }
         }
+    }
+}
+
+/// Steps between two kinks at which the extremes of a product are looked for: both factors are smooth between kinks.
+const STEPS_OF_PRODUCT: usize = 32;
+
+/// The product of two profiles that vary along the rod.
+#[derive(Debug)]
+struct ProfileProduct {
+    factors: [Profile; 2],
+    kinks: Vec<f64>,
+    seams: Vec<f64>,
+    extremes: [f64; 2],
+}
+
+impl ProfileProduct {
+    fn new(factors: [Profile; 2]) -> Self {
+        let knots = knot_places(&factors);
+        let inner = &knots[1..knots.len() - 1];
+        let mut product = ProfileProduct {
+            kinks: inner.iter().map(|place| place.sigma).collect(),
+            seams: sorted_distinct(factors.iter().flat_map(Profile::seams).copied()),
+            extremes: [f64::INFINITY, f64::NEG_INFINITY],
+            factors,
+        };
+        let edges = sorted_distinct(knots.iter().map(|place| place.sigma));
+        for ends in edges.windows(2) {
+            for step in 0..=STEPS_OF_PRODUCT {
+                let part = step as f64 / STEPS_OF_PRODUCT as f64;
+                let sigma = ends[0] + part * (ends[1] - ends[0]);
+                let value = product.value_at(0, RodPlace::within(sigma, [ends[0], ends[1]]));
+                let [least, most] = &mut product.extremes;
+                (*least, *most) = (least.min(value), most.max(value));
+            }
+        }
+        product
+    }
+}
+
+impl RodProperties for ProfileProduct {
+    fn value_at(&self, _: usize, place: RodPlace) -> f64 {
+        let [one, other] = &self.factors;
+        one.at(place) * other.at(place)
+    }
+
+    fn extremes(&self, _: usize) -> [f64; 2] {
+        self.extremes
+    }
+
+    fn kinks(&self) -> &[f64] {
+        &self.kinks
+    }
+
+    fn seams(&self) -> &[f64] {
+        &self.seams
+    }
+
+    fn integration_panels(&self) -> usize {
+        let [one, other] = self.factors.each_ref().map(Profile::integration_panels);
+        one.max(other)
+    }
+
+    fn as_any(&self) -> &dyn Any {
+        self
+    }
+
+    fn has_equal_property(&self, _: usize, other: &dyn Any) -> bool {
+        let other: Option<&ProfileProduct> = other.downcast_ref();
+        other.is_some_and(|other| self.factors == other.factors)
     }
 }
 
@@ -358,5 +448,25 @@ mod tests {
         let [base, tip] = [Side::Base, Side::Tip];
         assert_eq!([[0.0, 0.5], [0.5, 1.0]].map(towards), [base, tip]);
         assert_eq!([[0.5, 0.0], [1.0, 0.5]].map(towards), [base, tip]);
+    }
+
+    /// A product keeps the jumps of both factors; its integral is exact for polynomials.
+    #[test]
+    fn a_product_is_that_of_the_values() {
+        let step = linear([0.0, 0.5, 0.5, 1.0], [1.0, 3.0, 5.0, 4.0]);
+        let taper = linear([0.0, 1.0], [2.0, 1.0]);
+        assert_eq!(taper.times(&Profile::Constant(3.0)), taper.scaled(3.0));
+        let product = step.times(&taper);
+        assert_eq!(product, step.times(&taper));
+        assert_ne!(product, step.times(&step));
+        let sides = RodPlace::both_sides(0.5).map(|place| product.at(place));
+        assert_eq!(sides, [4.5, 7.5]);
+        assert_eq!(product.kinks(), [0.5, 0.5]);
+        // The largest values of (1 + 4x)(2 - x) and (6 - 2x)(2 - x) are at the step.
+        assert_eq!((product.min(), product.max_abs()), (2.0, 7.5));
+        let exact = [41.0 / 24.0, 41.0 / 24.0 + 17.0 / 6.0];
+        for (sigma, exact) in [0.5, 1.0].into_iter().zip(exact) {
+            assert!((product.integral(sigma) - exact).abs() < 1e-14);
+        }
     }
 }

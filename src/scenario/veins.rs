@@ -192,14 +192,17 @@ pub(super) enum StiffnessSource {
 impl StiffnessSource {
     pub fn from_entries(entries: &Entries, rods: usize) -> ScenarioResult<StiffnessSource> {
         if let Some(blade) = read_blade(entries, rods)? {
-            let parts = blade.parts();
-            let blade = Arc::new(blade);
-            return Ok(StiffnessSource::Blade { blade, parts });
+            return Ok(StiffnessSource::from_blade(Arc::new(blade)));
         }
         Ok(match section::read_sections(entries, rods)? {
             Some(sections) => StiffnessSource::Sections(sections),
             None => StiffnessSource::Stiffnesses,
         })
+    }
+
+    pub fn from_blade(blade: Arc<Blade>) -> StiffnessSource {
+        let parts = blade.parts();
+        StiffnessSource::Blade { blade, parts }
     }
 
     pub fn blade(&self) -> Option<&Arc<Blade>> {
@@ -216,14 +219,15 @@ impl StiffnessSource {
         }
     }
 
-    /// The moment of inertia per length about d1 along all veins, if a blade tells it.
-    pub fn polar_inertia(&self) -> Option<Vec<Profile>> {
-        match self {
-            StiffnessSource::Blade { parts, .. } => {
-                Some(parts.profiles(BladeProperty::PolarInertia))
-            }
-            _ => None,
-        }
+    /// The rotary inertia per length about d2 and d3 along veins of these densities, as sections or the strips of a blade
+    /// determine it; `None` if numbers are given.
+    pub fn rotary_inertia(&self, density: &[Profile]) -> Option<Vec<[Profile; 2]>> {
+        let gyration = |axis| self.property_profiles(Property::SquaredGyration(axis));
+        let each = density.iter().zip(gyration(0)?).zip(gyration(1)?);
+        let inertia = |((density, about_2), about_3): ((&Profile, Profile), Profile)| {
+            [density.times(&about_2), density.times(&about_3)]
+        };
+        Some(each.map(inertia).collect())
     }
 
     /// A property along all veins, as sections or a blade determine it; `None` if numbers are given.

@@ -99,7 +99,7 @@ const BLOWN: &str = r#"
     stiffness = { torsion = 0.8, bending_2 = 1.0, bending_3 = 1.4, axial = 60.0, shear_2 = 70.0, shear_3 = 50.0 }
     load = { gravity = [0.1, 0.2, -0.5], follower = [0.2, -0.4, 0.8] }
     wind = { velocity = [0.5, 0.8, 1.0], density = 1.2, drag = 2.0, width = 0.3 }
-    dynamics = { density = 1.3, rotary_inertia = 0.01, external_damping = 0.2, internal_damping = 0.01 }
+    dynamics = { density = 1.3, rotary_inertia = 0.01, rotary_inertia_3 = 0.03, external_damping = 0.2, internal_damping = 0.01 }
 "#;
 
 /// Frequencies of damped motions give numbers back, and the derivatives by which their bars are told are differences
@@ -117,6 +117,8 @@ fn damped_frequencies_are_differentiated() {
         (BLOWN, "stiffness.bending_3", 1.6),
         (BLOWN, "wind.drag", 2.2),
         (BLOWN, "dynamics.density", 1.4),
+        (BLOWN, "dynamics.rotary_inertia_3", 0.035),
+        (calm.as_str(), "dynamics.rotary_inertia", 0.012),
         (calm.as_str(), "stiffness.bending_2", 1.15),
         (calm.as_str(), "load.follower[2]", 0.9),
     ] {

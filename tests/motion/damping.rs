@@ -21,7 +21,7 @@ const SIZE: f64 = 1e-6;
 
 fn rod() -> Scenario {
     let mut rod = paper_leaf(1, [0.8, 1.1, 0.9], [90.0, 60.0, 40.0], 0.0);
-    rod.dynamics.rotary_inertia = vec![Profile::Constant(0.01)];
+    rod.dynamics.rotary_inertia = vec![[0.01; 2].map(Profile::Constant)];
     rod.dynamics.external_damping = 0.0;
     rod
 }

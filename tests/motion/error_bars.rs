@@ -117,7 +117,7 @@ fn random_motion(seed: u64) -> (Scenario, Options) {
     let unit = leaf.dynamics.natural_time(&leaf.rods);
     if kind > 1 {
         let radius: f64 = random.uniform(0.02, 0.15);
-        let inertia = Profile::Constant(0.25 * radius * radius);
+        let inertia = [0.25 * radius * radius; 2].map(Profile::Constant);
         leaf.dynamics.rotary_inertia = vec![inertia; leaf.rods.len()];
         leaf.gravity = [0; 3].map(|_| random.uniform(-2.0, 2.0));
         leaf.dynamics.gravity = Schedule::constant(leaf.gravity);

@@ -20,6 +20,7 @@ mod pulses;
 mod released_rigid;
 mod released_stiff;
 mod rest_on_own_grid;
+mod rotary_inertia;
 mod stability;
 mod stiff;
 mod supports;

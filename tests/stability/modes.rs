@@ -70,6 +70,93 @@ fn timoshenko_beams_with_all_modes_in_space() {
     }
 }
 
+/// A beam of a flat section, four times as wide as thick, with the slenderness of the first row of the table about d2 and
+/// of the second about d3. It twists with the inertia rho (I2 + I3).
+fn flat_beam(torsion: f64) -> (Scenario, Vec<f64>) {
+    let [soft, stiff, _] = table::<6>(TIMOSHENKO)[..] else {
+        panic!("three rows");
+    };
+    let [[r2, s2, bending_2 @ ..], [r3, s3, bending_3 @ ..]] = [soft, stiff];
+    let [axial, shear] = [1.0 / r2, 1.0 / s2];
+    close("section", 16.0 * r2 / r3 + 16.0 * s2 / s3, 2.0, 1e-14);
+    let beam = parse(&format!(
+        r#"
+        name = "flat"
+        leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+        stiffness = {{ torsion = {torsion:?}, bending_2 = 1.0, bending_3 = 16.0, axial = {axial:?}, shear_2 = {shear:?}, shear_3 = {shear:?} }}
+        dynamics = {{ density = 1.0, rotary_inertia = {r2:?}, rotary_inertia_3 = {r3:?}, external_damping = 0.0 }}
+        "#
+    ));
+    let bars = |speed: f64| (1..5).map(move |k| (f64::from(k) - 0.5) * PI * speed);
+    let waves = bars((torsion / (r2 + r3)).sqrt()).chain(bars(axial.sqrt()));
+    let bending = bending_2.into_iter().chain(bending_3.map(|it| 4.0 * it));
+    let mut known: Vec<f64> = waves.chain(bending).collect();
+    known.sort_by(f64::total_cmp);
+    known.retain(|&omega| omega <= bending_2[3]);
+    (beam, known)
+}
+
+#[test]
+fn a_flat_beam_vibrates_about_either_axis_with_its_own_inertia() {
+    let (beam, known) = flat_beam(0.7);
+    assert_eq!(known.len(), 8);
+    assert_known("flat", &settled(&beam, &with(8)), &known, 1e-11);
+    let errors = [64, 128].map(|segments| {
+        let leaf = settled(&beam, &with_on(segments, 8));
+        let found = modes_of(&leaf).iter().filter_map(Mode::frequency);
+        found
+            .zip(&known)
+            .map(|(found, known)| found - known)
+            .collect::<Vec<_>>()
+    });
+    for k in 0..8 {
+        close("order", order(errors[0][k], errors[1][k]), 2.0, 0.02);
+    }
+}
+
+/// A strip 0.3 m long, 40 mm wide and 0.4 mm thick bends so slenderly that its frequencies are those of Euler and Bernoulli,
+/// the fourth to less than 1e-4, and twists with A1 and rho (I2 + I3): with the mass per volume, with the mass per length,
+/// and with both moments of inertia as numbers.
+#[test]
+fn a_strip_has_the_inertia_of_its_section() {
+    let [length, width, thickness, young, density] = [0.3, 0.04, 4e-4, 2e9, 800.0_f64];
+    let (area, mass) = (width * thickness, density * width * thickness);
+    let gyration = [thickness, width].map(|side| side * side / 12.0);
+    let given = gyration.map(|squared| mass * squared);
+    for (of_section, dynamics) in [
+        (format!(", mass_density = {density:?}"), String::new()),
+        (String::new(), format!("density = {mass:?}")),
+        (
+            String::new(),
+            format!(
+                "density = {mass:?}, rotary_inertia = {:?}, rotary_inertia_3 = {:?}",
+                given[0], given[1]
+            ),
+        ),
+    ] {
+        let strip = parse(&format!(
+            r#"
+            name = "strip"
+            leaf = {{ rods = 1, length = {length:?}, fan = [0.0] }}
+            section = {{ shape = "rectangle", width = {width:?}, thickness = {thickness:?}, young = {young:?}{of_section} }}
+            dynamics = {{ {dynamics} }}
+            "#
+        ));
+        let slender = [SLENDER[0], SLENDER[1], SLENDER[2], 10.995_540_734_875_467];
+        let bending =
+            slender.map(|b| (b / length).powi(2) * (young * gyration[0] * area / mass).sqrt());
+        let torsion = strip.rods[0].couple_stiffness[0].at(0.5);
+        let twist = 0.5 * PI / length * (torsion / (given[0] + given[1])).sqrt();
+        let [one, two, three, four] = bending;
+        let leaf = settled(&strip, &with(5));
+        for (mode, known) in modes_of(&leaf).iter().zip([one, two, twist, three, four]) {
+            close("frequency", mode.frequency().unwrap() / known, 1.0, 1e-4);
+        }
+        let doubts = format!("{:?}", leaf.doubts);
+        assert!(!doubts.contains("Inertia"), "{doubts}");
+    }
+}
+
 /// A grid makes frequencies wrong by the square of its segments' length.
 #[test]
 fn frequencies_of_one_grid_converge_in_second_order() {
@@ -226,7 +313,7 @@ fn eigenvalues_are_those_of_a_dense_method() {
     };
     assert_as_dense("three veins", &three_veins(), &on(6, 25));
     let mut round = three_veins();
-    round.dynamics.polar_inertia = PolarInertia::Excess(1.0);
+    round.dynamics.polar_inertia = PolarInertia::Sum;
     round.dynamics.density = vec![Profile::Constant(7.0); 3];
     assert_as_dense("heavier", &round, &on(6, 25));
     let mut free = three_veins();
@@ -377,7 +464,7 @@ fn frequencies_are_in_the_units_of_the_scenario() {
     other.dynamics = Dynamics::default_for(&other.rods);
     let density = 4.0 * other.dynamics.mean_density();
     other.dynamics.density = vec![Profile::Constant(density); 3];
-    other.dynamics.rotary_inertia = vec![Profile::Constant(density); 3];
+    other.dynamics.rotary_inertia = vec![[density; 2].map(Profile::Constant); 3];
     let other = settled(&other, &with(3));
     for (a, b) in modes_of(&natural).iter().zip(modes_of(&other)) {
         close("eigenvalue", 4.0 * b.eigenvalue / a.eigenvalue, 1.0, 1e-9);

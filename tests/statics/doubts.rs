@@ -130,17 +130,6 @@ fn impossible_materials_are_named() {
     for (entries, code) in pairs(table) {
         assert_eq!(codes(&doubts(STRIP, entries)), code, "{entries}");
     }
-    // A mass per length tells nothing of the inertia of a section, which is known here.
-    let by_length = STRIP.replace(
-        ", mass_density = 1e-5 }",
-        " }\ndynamics = { density = 3e-7 }",
-    );
-    assert_eq!(codes(&doubts(&by_length, "")), "assumed-rotary-inertia");
-    assert_eq!(
-        codes(&doubts(&by_length, "dynamics.rotary_inertia=1.25e-8")),
-        ""
-    );
-    assert_eq!(codes(&doubts(&by_length, "section.width=3.0")), "");
 }
 
 /// A weight per length and an acceleration add up: both state the same weight, or contradict each

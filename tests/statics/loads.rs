@@ -171,3 +171,35 @@ fn a_tapered_column_under_its_own_weight() {
         1e-8,
     );
 }
+
+/// At stations between the nodes beside a loaded point, from which a leaf is integrated to them, the force is that of all
+/// loads beyond: the load counts once, also where the node of the point is beside it by rounding, as at 0.37.
+#[test]
+fn stations_beside_a_loaded_point_bear_the_load_once() {
+    let (weight, force) = (DVec3::new(0.0, 0.0, -1.0), DVec3::new(0.0, 0.3, 0.5));
+    for at in [0.37, 0.23, 0.61, 0.77, 0.93] {
+        let text = format!(
+            "{ROD}\nload.gravity = {:?}\n[[load.point]]\nvein = 1\nat = {at:?}\nforce = {:?}",
+            weight.to_array(),
+            force.to_array()
+        );
+        let scenario = parse(&text);
+        let at_tenths = |tolerance: f64| {
+            let options = Options {
+                stations: Some(10),
+                ..to(tolerance)
+            };
+            settled(&scenario, &options).at_stations(&scenario, Some(10))
+        };
+        let (leaf, exact) = (at_tenths(1e-6), at_tenths(1e-10));
+        assert_eq!(leaf.outcome, Outcome::Converged, "{at}: {:?}", leaf.remark);
+        let [nodes, truth] = [&leaf, &exact].map(|it| &it.shape.rods[0].nodes);
+        for ((node, truth), &sigma) in nodes.iter().zip(truth).zip(&leaf.shape.stations) {
+            let beyond = (1.0 - sigma) * weight + if sigma < at { force } else { DVec3::ZERO };
+            let off = (node.rotation * node.n).distance(beyond);
+            assert!(off < 1e-6, "{at}, {sigma}: {off:e}");
+            let off = node.position.distance(truth.position);
+            assert!(off < estimate(&leaf), "{at}, {sigma}: {off:e}");
+        }
+    }
+}

@@ -47,7 +47,13 @@ fn the_same_leaf_with_its_stiffnesses_written_out() {
     text += "[dynamics]\n";
     let dynamics = &leaf.dynamics;
     text += &list("density", dynamics.density.iter().collect());
-    text += &list("rotary_inertia", dynamics.rotary_inertia.iter().collect());
+    for (axis, key) in ["rotary_inertia", "rotary_inertia_3"]
+        .into_iter()
+        .enumerate()
+    {
+        let about_axis = dynamics.rotary_inertia.iter().map(|both| &both[axis]);
+        text += &list(key, about_axis.collect());
+    }
     assert_eq!(with(&text).unwrap(), leaf);
     // Mass of the first vein per length: 2 times 0.2 times 0.05.
     leafdyn_testing::close("density", leaf.dynamics.density[0].at(0.1), 0.02, 1e-16);

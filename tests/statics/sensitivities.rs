@@ -207,7 +207,8 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         false => sliding(&mut draw, number, rods),
     };
     let all = "rest.twist[0] rest.bend_2[0] rest.bend_3[0] rest.stretch load.gravity[0] \
-               load.gravity[2] load.tip_force[1] leaf.length[0] leaf.fan[0] dynamics.density";
+               load.gravity[2] load.tip_force[1] leaf.length[0] leaf.fan[0] dynamics.density \
+               dynamics.rotary_inertia dynamics.rotary_inertia_3";
     let keys = [
         all,
         its_keys,
@@ -238,7 +239,7 @@ fn random(number: usize) -> (String, Vec<&'static str>) {
         rest = {{ twist = {:?}, bend_2 = {:?}, bend_3 = {:?}, stretch = 1.1 }}
         load.gravity = [{:?}, 0.0, {:?}]
         load.tip_force = {:?}
-        dynamics = {{ density = 1.3, rotary_inertia = 0.01 }}
+        dynamics = {{ density = 1.3, rotary_inertia = 0.01, rotary_inertia_3 = 0.02 }}
         "#,
         match (hinged, elastic) {
             (_, true) => "elastic",

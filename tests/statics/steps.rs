@@ -266,7 +266,8 @@ fn steps_survive_being_written() {
         assert_eq!(serde_json::to_string(&again).unwrap(), json);
     }
     let scenario = parse(&format!("name = 'stem'\n{leaf}{}", texts[2]));
-    let inertia = &scenario.dynamics.rotary_inertia[0];
+    let [inertia, about_3] = &scenario.dynamics.rotary_inertia[0];
+    assert_eq!(inertia, about_3);
     let values = [0.1, 0.3, 0.5].map(|sigma| inertia.at(sigma));
     let wanted = [0.01 / 4.0, 0.02 / 4.0, 0.08 / 4.0];
     for (value, wanted) in values.into_iter().zip(wanted) {

@@ -7,7 +7,9 @@ use leafdyn::internals::motion::{
 };
 use leafdyn::internals::relax::initial_state;
 use leafdyn::relax::Equilibrium;
-use leafdyn::scenario::{Grip, PointLoad, Profile, Scenario, Schedule, SupportKind, Tissue};
+use leafdyn::scenario::{
+    Grip, PointLoad, PolarInertia, Profile, Scenario, Schedule, SupportKind, Tissue,
+};
 use leafdyn::simulate::{self, Frame, Simulation};
 
 pub use leafdyn::simulate::Scheme;
@@ -27,11 +29,13 @@ pub fn curling(times: f64) -> Schedule<f64> {
 /// External and internal damping.
 pub const DAMPINGS: [(f64, f64); 4] = [(0.0, 0.0), (1.5, 0.0), (0.0, 0.01), (1.5, 0.01)];
 
-/// A twisted rod of three different bending and shear stiffnesses, without
+/// A twisted rod of three different bending and shear stiffnesses and moments of inertia, without
 /// loads and undamped; natural units.
 pub fn twisted_rod() -> Scenario {
     let mut rod = paper_leaf(1, [0.9, 1.4, 0.7], [90.0, 60.0, 40.0], 0.0);
     rod.rods[0].rest_curvature = [0.8, -0.5, 0.6].map(Profile::Constant);
+    rod.dynamics.rotary_inertia = vec![[0.01, 0.025].map(Profile::Constant)];
+    rod.dynamics.polar_inertia = PolarInertia::Sum;
     rod.dynamics.external_damping = 0.0;
     rod
 }
@@ -114,7 +118,7 @@ pub fn at_beginning(scenario: &Scenario) -> Scenario {
 pub fn beam(r2: f64, [axial, shear]: [f64; 2]) -> Scenario {
     let mut beam = paper_leaf(1, [1.0; 3], [axial, shear, shear], 0.0);
     beam.rods[0].angle = 0.0;
-    beam.dynamics.rotary_inertia = vec![Profile::Constant(r2)];
+    beam.dynamics.rotary_inertia = vec![[r2; 2].map(Profile::Constant)];
     beam.dynamics.external_damping = 0.0;
     beam
 }
@@ -126,7 +130,7 @@ pub fn chain(part: f64) -> Scenario {
     let mut rod = paper_leaf(1, [soft; 3], [stiff; 3], 0.0);
     rod.rods[0].angle = 0.0;
     rod.dynamics.density = vec![Profile::Constant(1.0)];
-    rod.dynamics.rotary_inertia = vec![Profile::Constant(soft)];
+    rod.dynamics.rotary_inertia = vec![[soft; 2].map(Profile::Constant)];
     rod.gravity = [1.0, 0.0, 0.0];
     rod.dynamics.gravity = Schedule::constant(rod.gravity);
     rod

@@ -205,7 +205,11 @@ prop_compose! {
         let dynamics = &mut leaf.dynamics;
         let squared = radius.iter().map(|radius| 0.25 * radius * radius);
         let both = density.iter().zip(squared);
-        dynamics.rotary_inertia = both.map(|(density, squared)| density.scaled(squared)).collect();
+        let inertia = |(density, squared): (&Profile, f64)| {
+            let about_both = density.scaled(squared);
+            [about_both.clone(), about_both]
+        };
+        dynamics.rotary_inertia = both.map(inertia).collect();
         dynamics.density = density;
         leaf
     }

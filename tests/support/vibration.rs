@@ -2,11 +2,10 @@
 
 use std::ops::Range;
 
-use glam::{DMat3, DVec3};
+use glam::DMat3;
 use leafdyn::internals::leaf::{DirectSolver, DiscreteLeaf, Leaf, State, System};
 use leafdyn::internals::modes::{Eigenpair, ModeRequest, lowest};
 use leafdyn::internals::motion::Physics;
-use leafdyn::internals::rotation::outer;
 use nalgebra::{DMatrix, DVector};
 
 use crate::Limit;
@@ -59,10 +58,9 @@ impl Linear {
             let node = state.base(j) + i;
             let [turn, _, _, shift, ..] = self.numbers.unknowns(j, i);
             let inertia = physics.inertia(leaf, j, i);
-            let d1 = state.q[node] * DVec3::X;
-            let own = (inertia.transverse / inertia.polar()).sqrt() - 1.0;
-            let root = inertia.transverse.sqrt().recip();
-            let root = root * (DMat3::IDENTITY + own * outer(d1, d1));
+            let frame = DMat3::from_quat(state.q[node]);
+            let root = DMat3::from_diagonal(inertia.principal.map(f64::sqrt).recip());
+            let root = frame * root * frame.transpose();
             for (r, c) in (0..9).map(|k| (k / 3, k % 3)) {
                 self.per_root_mass[(turn + r, turn + c)] = root.col(c)[r];
             }

@@ -537,6 +537,11 @@ const KEY_WORDS: &[(&str, &str, ListEntryOwner)] = &[
     ("foundation.stiffness", "stiffness of foundation", Along),
     ("dynamics.density", "mass per length", Veins),
     ("dynamics.rotary_inertia", "rotary inertia", Veins),
+    (
+        "dynamics.rotary_inertia_3",
+        "rotary inertia about d3",
+        Veins,
+    ),
     ("dynamics.section_radius", "radius of the section", Veins),
     ("dynamics.external_damping", "external damping", Plain),
     ("dynamics.internal_damping", "internal damping", Plain),

@@ -1,7 +1,7 @@
 //! The table `[dynamics]`: what it may say, what holds where it says nothing,
 //! and every way to get it wrong.
 
-use leafdyn::scenario::{Dynamics, ScenarioError};
+use leafdyn::scenario::{Dynamics, PolarInertia, ScenarioError};
 use leafdyn_testing::valid::{all_refused, holds};
 use leafdyn_testing::*;
 use proptest::prelude::*;
@@ -58,7 +58,7 @@ fn what_holds_without_the_table() {
     let dynamics = &scenario.dynamics;
     close(dynamics.mean_density(), 2.0 / 16.0);
     assert_eq!(dynamics.density[0], dynamics.density[1]);
-    close(dynamics.rotary_inertia[1].at(0.3), 0.125 * 0.16 / 4.0);
+    close(dynamics.rotary_inertia[1][0].at(0.3), 0.125 * 0.16 / 4.0);
     close(dynamics.external_damping, 2.0 * 3.516 * 0.125);
     assert_eq!(dynamics.internal_damping, 0.0);
     assert_eq!(dynamics.duration, 10.0);
@@ -81,8 +81,8 @@ fn what_is_left_out_follows_from_the_density() {
     close(dynamics.duration, 80.0);
     close(dynamics.output_interval, 0.8);
     close(dynamics.external_damping, 2.0 * 3.516);
-    close(dynamics.rotary_inertia[0].at(0.0), 0.24);
-    close(dynamics.rotary_inertia[1].at(0.0), 0.4);
+    close(dynamics.rotary_inertia[0][0].at(0.0), 0.24);
+    close(dynamics.rotary_inertia[1][0].at(0.0), 0.4);
     let dynamics = accepted("duration = 3");
     close(dynamics.output_interval, 0.03);
 }
@@ -97,7 +97,15 @@ fn what_is_given_is_taken() {
          rest = { at = [0, 1, 2], factor = [1, -1, 0.5] }",
     );
     assert_eq!(dynamics.density, vec![Profile::Constant(2.0); 2]);
-    assert_eq!(dynamics.rotary_inertia[1].at(0.5), 3.5);
+    assert_eq!(dynamics.rotary_inertia[1][0].at(0.5), 3.5);
+    // About both axes of bending, unless that about d3 is given.
+    let both = |dynamics: &Dynamics| dynamics.rotary_inertia[1].each_ref().map(|it| it.at(0.5));
+    assert_eq!(both(&dynamics), [3.5; 2]);
+    let apart = accepted("rotary_inertia = 0.2\nrotary_inertia_3 = [0.3, 0.4]");
+    assert_eq!(
+        (both(&apart), apart.polar_inertia),
+        ([0.2, 0.4], PolarInertia::Sum)
+    );
     assert_eq!(dynamics.external_damping, 0.0);
     assert_eq!(dynamics.internal_damping, 1e-3);
     assert_eq!((dynamics.duration, dynamics.output_interval), (4.0, 4.0));
@@ -114,14 +122,14 @@ fn what_is_given_is_taken() {
 #[test]
 fn a_radius_gives_the_moment_of_inertia() {
     let dynamics = accepted("density = [2.0, 3.0]\nsection_radius = [0.2, 0.4]");
-    close(dynamics.rotary_inertia[0].at(0.0), 0.02);
-    close(dynamics.rotary_inertia[1].at(1.0), 0.12);
+    close(dynamics.rotary_inertia[0][0].at(0.0), 0.02);
+    close(dynamics.rotary_inertia[1][0].at(1.0), 0.12);
     let dynamics = accepted(
         "density = { at = [0, 0.5, 1], value = [4, 4, 2] }\nsection_radius = { at = [0, 1], value = [0.4, 0.2] }",
     );
     let expected = [(0.0, 0.16), (0.5, 0.09), (1.0, 0.02), (0.25, 0.125)];
     for (sigma, inertia) in expected {
-        close(dynamics.rotary_inertia[0].at(sigma), inertia);
+        close(dynamics.rotary_inertia[0][0].at(sigma), inertia);
     }
     // The product at the knots of both.
     let dynamics = accepted(
@@ -131,10 +139,13 @@ fn a_radius_gives_the_moment_of_inertia() {
         &[0.0, 0.25, 0.5, 1.0],
         &[4.0, 3.0, 0.5 * (5.0_f64 / 3.0).powi(2), 0.5],
     );
-    assert_eq!(dynamics.rotary_inertia[0], both);
+    assert_eq!(dynamics.rotary_inertia[0][0], both);
     // With one radius it is exact.
     let dynamics = accepted("density = { at = [0, 1], value = [4, 2] }\nsection_radius = 2");
-    assert_eq!(dynamics.rotary_inertia[0], linear(&[0.0, 1.0], &[4.0, 2.0]));
+    assert_eq!(
+        dynamics.rotary_inertia[0][0],
+        linear(&[0.0, 1.0], &[4.0, 2.0])
+    );
 }
 
 #[test]
@@ -175,7 +186,7 @@ fn overrides() {
 #[test]
 fn unknown_keys() {
     let table = r#"
-        denisty = 1.0 => leaf.toml:20: unknown key dynamics.denisty (did you mean dynamics.density?) & density, rotary_inertia, section_radius, external_damping, internal_damping, duration, output_interval, clamped, start, gravity, tip_force, tip_moment, rest
+        denisty = 1.0 => leaf.toml:20: unknown key dynamics.denisty (did you mean dynamics.density?) & density, rotary_inertia, rotary_inertia_3, section_radius, external_damping, internal_damping, duration, output_interval, clamped, start, gravity, tip_force, tip_moment, rest
         [dynamics.load] => unknown key dynamics.load
     "#;
     all_refused(table, with_lines);
@@ -195,6 +206,8 @@ fn wrong_types_and_ranges() {
         density = true => dynamics.density = true: must be a number, a list of 2 (one per rod), or a profile
         \nrotary_inertia = { at = [0, 1], value = [1, 0] } => leaf.toml:21: dynamics.rotary_inertia, value, entry 2 = 0: must be greater than 0
         section_radius = -1 => dynamics.section_radius = -1: must be greater than 0
+        rotary_inertia_3 = 0.1 => leaf.toml:20: dynamics.rotary_inertia_3 = 0.1: is the inertia about d3 alone: give dynamics.rotary_inertia, that about d2, too
+        section_radius = 0.1\nrotary_inertia_3 = 0.1 => is the inertia about d3 alone
         section_radius = 0.1\nrotary_inertia = 0.1 => leaf.toml:20: dynamics.section_radius = 0.1: dynamics.rotary_inertia is given, too & leave one of them out
         external_damping = -1 => leaf.toml:20: dynamics.external_damping = -1: must not be negative
         external_damping = [1.0, 1.0] => dynamics.external_damping = [1.0, 1.0]: must be a number
@@ -246,6 +259,7 @@ fn limits_that_values_set_together() {
         density = [1.0, 1e-13] => leaf.toml:20: dynamics.density, entry 2 = 1e-13: gives rho/rho_mean = 2.000e-13, the limit is 1e-12
         density = { at = [0, 0.5, 1], value = [1e13, 1, 1] } => rho/rho_mean = 1.000e13, the limit is 1e12
         density = 1.0\nrotary_inertia = 1e13 => leaf.toml:21: dynamics.rotary_inertia = 1e13: gives rho I/(rho_mean L^2) = 2.500e12, the limit is 1e12
+        rotary_inertia = 1.0\nrotary_inertia_3 = 1e13 => leaf.toml:21: dynamics.rotary_inertia_3 = 1e13: gives rho I/(rho_mean L^2)
         density = 1.0\nrotary_inertia = [1.0, 1e-13] => dynamics.rotary_inertia, entry 2 = 1e-13: gives rho I/(rho_mean L^2) = 2.500e-14
         section_radius = [0.1, 1e-6] => dynamics.section_radius, entry 2 = 1e-6: gives r/L = 5.000e-7, the limit is 1e-6
         density = 8\nexternal_damping = 1e13 => leaf.toml:21: dynamics.external_damping = 1e13: gives c T/rho_mean = 1.000e13, the limit is 1e12
@@ -272,7 +286,10 @@ fn limits_that_values_set_together() {
 }
 
 fn positive_and_finite(dynamics: &Dynamics) -> bool {
-    let profiles = dynamics.density.iter().chain(&dynamics.rotary_inertia);
+    let profiles = dynamics
+        .density
+        .iter()
+        .chain(dynamics.rotary_inertia.iter().flatten());
     let values = profiles.flat_map(|it| [0.0, 0.3, 0.5, 1.0].map(|s| it.at(s)));
     let times = [dynamics.duration, dynamics.output_interval];
     let mut values = values.chain(times).chain([dynamics.external_damping]);

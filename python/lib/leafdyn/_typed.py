@@ -72,6 +72,7 @@ class DynamicsTable(TypedDict, total=False):
     output_interval: float
     rest: Profile
     rotary_inertia: float | Numbers | Profile
+    rotary_inertia_3: float | Numbers | Profile
     section_radius: float | Numbers | Profile
     start: str
     tip_force: Profile

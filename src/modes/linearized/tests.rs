@@ -67,7 +67,7 @@ fn a_dense_matrix_has_all_roots() {
             leaf = {{ rods = 2, length = [1.0, 0.9], fan = "symmetric" }}
             stiffness = {{ torsion = 0.8, bending_2 = 1.0, bending_3 = 1.4, axial = 60.0, shear_2 = 70.0, shear_3 = 50.0 }}
             coupling = {{ x = 1.0, y = 2.0, z = 1.5 }}
-            dynamics = {{ density = 1.0, rotary_inertia = 0.01, {dynamics} }}
+            dynamics = {{ density = 1.0, rotary_inertia = 0.01, rotary_inertia_3 = [0.03, 0.02], {dynamics} }}
             {more}"#
         )
     };

@@ -296,8 +296,11 @@ const SINC: [f64; 3] = [1.0, -1.0 / 6.0, 1.0 / 120.0];
 impl PackStep<'_> {
     /// Moves the nodes of a block, at `span` in the arrays of the pack, with the forces in
     /// the block; returns eight times their kinetic energy in the middle of the
-    /// kick. Every node rotates as a torque-free body with one axis of symmetry:
-    /// about its angular momentum, and about its own axis.
+    /// kick. Every node rotates as a torque-free body: if it has an axis of symmetry, about its angular momentum p and about
+    /// that axis. With three different moments of inertia its energy is p^2/(2 J1) + E2 + E3 with
+    /// Ek = (1/Jk - 1/J1) (dk . p)^2/2, each of which alone turns it about one axis: about p, d2 or d3. The first turn
+    /// commutes with the others; those are half of that about d3, that about d2, and the other half (S. Reich,
+    /// Physica D 76, 1994, 375): of second order, symplectic, and the angular momentum stays.
     #[inline(always)]
     fn kick_and_drift<S: Simd>(&mut self, simd: S, span: ArraySpan) -> Lanes<S> {
         // In two loops: the processor overlaps iterations of short ones.
@@ -310,9 +313,12 @@ impl PackStep<'_> {
             (Some(coupling), None) => self.translate_nodes::<S, true, false>(simd, span, coupling),
             (None, None) => self.translate_nodes::<S, false, false>(simd, span, none),
         };
-        let turning = match self.normalize {
-            true => self.rotate_nodes::<S, true>(simd, span),
-            false => self.rotate_nodes::<S, false>(simd, span),
+        let about_d1 = self.material[span.first / NODES_PER_BLOCK].spins_about_d1;
+        let turning = match (about_d1, self.normalize) {
+            (true, true) => self.rotate_nodes::<S, true, true>(simd, span),
+            (true, false) => self.rotate_nodes::<S, true, false>(simd, span),
+            (false, true) => self.rotate_nodes::<S, false, true>(simd, span),
+            (false, false) => self.rotate_nodes::<S, false, false>(simd, span),
         };
         moving + turning
     }
@@ -406,7 +412,7 @@ impl PackStep<'_> {
 
     /// Kicks the angular momenta and drifts the rotations of a block.
     #[inline(always)]
-    fn rotate_nodes<S: Simd, const NORMALIZE: bool>(
+    fn rotate_nodes<S: Simd, const ABOUT_D1: bool, const NORMALIZE: bool>(
         &mut self,
         simd: S,
         span: ArraySpan,
@@ -415,10 +421,9 @@ impl PackStep<'_> {
         let own = |array| slice(array, ArraySpan::new(0, nodes));
         let blocks = self.material;
         let material = &blocks[start / NODES_PER_BLOCK];
-        let (per_inertia, per_spin) = (
-            own(&material.inverse_inertia),
-            own(&material.inverse_spin_excess),
-        );
+        let per_inertia = own(&material.inverse_inertia);
+        let [first_spin, second_spin] =
+            array_chunks(&material.inverse_spin_excess, ArraySpan::new(0, nodes));
         let left = array_chunks(&self.block.left, ArraySpan::new(MAX_LANES, nodes));
         let right = array_chunks(&self.block.right, ArraySpan::new(MAX_LANES - 1, nodes));
         let PackMotion { q, p, .. } = &mut *self.motion;
@@ -444,35 +449,42 @@ impl PackStep<'_> {
             after.store(&mut p, at);
             let rotation = quaternion(simd, &q, at);
             let (r, w) = (rotation.vector, rotation.scalar);
-            let (y, z) = (r.y + r.y, r.z + r.z);
-            let d1 = Vectors::new(
-                r.y.neg_mul_add(y, r.z.neg_mul_add(z, one)),
-                r.x.mul_add(y, w * z),
-                w.neg_mul_add(y, r.x * z),
-            );
             let per_inertia = Lanes::load(simd, per_inertia, at);
-            let per_spin = Lanes::load(simd, per_spin, at);
+            let per_spin = Lanes::load(simd, first_spin, at);
             let twice = before + after;
-            let spin = d1.dot(twice);
             energy = (twice.dot(twice)).mul_add(per_inertia, energy);
-            energy = (spin * spin).mul_add(per_spin, energy);
-
-            // Half angle about the body's own axis d1.
-            let b = d1.dot(after) * (half_step * per_spin);
-            let squared = b * b;
-            let (mut c, mut s) = (squared.polynomial(&COS), b * squared.polynomial(&SINC));
-            if NORMALIZE {
+            let length = match NORMALIZE {
                 // Newton's iteration for the length, which is nearly one.
-                let scale = half.neg_mul_add(r.dot(r) + w * w, three_halves);
-                (c, s) = (c * scale, s * scale);
-            }
-            // q <- q (s, 0, 0, c)
-            let spun = Vectors::new(
-                r.x.mul_add(c, w * s),
-                r.y.mul_add(c, r.z * s),
-                r.y.neg_mul_add(s, r.z * c),
-            );
-            let spun_w = r.x.neg_mul_add(s, w * c);
+                true => half.neg_mul_add(r.dot(r) + w * w, three_halves),
+                false => one,
+            };
+            let spun = if ABOUT_D1 {
+                let d1 = first_director(rotation);
+                let spin = d1.dot(twice);
+                energy = (spin * spin).mul_add(per_spin, energy);
+                let mut turn = half_turn(d1.dot(after) * (half_step * per_spin));
+                if NORMALIZE {
+                    turn = turn.map(|part| part * length);
+                }
+                spun_about_d1(rotation, turn)
+            } else {
+                let (d2, d3) = (second_director(rotation), third_director(rotation));
+                let (spin_2, spin_3) = (d2.dot(twice), d3.dot(twice));
+                let per_spin_3 = Lanes::load(simd, second_spin, at);
+                energy = (spin_2 * spin_2).mul_add(per_spin, energy);
+                energy = (spin_3 * spin_3).mul_add(per_spin_3, energy);
+                let half_spin = half * half_step * per_spin_3;
+                let mut turn = half_turn(d3.dot(after) * half_spin);
+                if NORMALIZE {
+                    turn = turn.map(|part| part * length);
+                }
+                let spun = spun_about_d3(rotation, turn);
+                let about_2 = second_director(spun).dot(after) * (half_step * per_spin);
+                let spun = spun_about_d2(spun, half_turn(about_2));
+                let about_3 = third_director(spun).dot(after) * half_spin;
+                spun_about_d3(spun, half_turn(about_3))
+            };
+            let (spun, spun_w) = (spun.vector, spun.scalar);
             // Half angle about the angular momentum.
             let a = after.scale(half_step * per_inertia);
             let squared = a.dot(a);
@@ -487,6 +499,91 @@ impl PackStep<'_> {
             at += S::F64_LANES;
         }
         energy
+    }
+}
+
+/// d1 of unit quaternions.
+#[inline(always)]
+fn first_director<S: Simd>(q: Quaternions<S>) -> Vectors<S> {
+    let (r, w, one) = (q.vector, q.scalar, Lanes::splat(q.scalar.simd, 1.0));
+    let (y, z) = (r.y + r.y, r.z + r.z);
+    Vectors::new(
+        r.y.neg_mul_add(y, r.z.neg_mul_add(z, one)),
+        r.x.mul_add(y, w * z),
+        w.neg_mul_add(y, r.x * z),
+    )
+}
+
+/// d2 of unit quaternions.
+#[inline(always)]
+fn second_director<S: Simd>(q: Quaternions<S>) -> Vectors<S> {
+    let (r, w, one) = (q.vector, q.scalar, Lanes::splat(q.scalar.simd, 1.0));
+    let (x, z) = (r.x + r.x, r.z + r.z);
+    Vectors::new(
+        w.neg_mul_add(z, r.y * x),
+        r.x.neg_mul_add(x, r.z.neg_mul_add(z, one)),
+        r.y.mul_add(z, w * x),
+    )
+}
+
+/// d3 of unit quaternions.
+#[inline(always)]
+fn third_director<S: Simd>(q: Quaternions<S>) -> Vectors<S> {
+    let (r, w, one) = (q.vector, q.scalar, Lanes::splat(q.scalar.simd, 1.0));
+    let (x, y) = (r.x + r.x, r.y + r.y);
+    Vectors::new(
+        r.z.mul_add(x, w * y),
+        w.neg_mul_add(x, r.z * y),
+        r.x.neg_mul_add(x, r.y.neg_mul_add(y, one)),
+    )
+}
+
+/// Cosine and sine of half of an angle, of the half angle `b`.
+#[inline(always)]
+fn half_turn<S: Simd>(b: Lanes<S>) -> [Lanes<S>; 2] {
+    let squared = b * b;
+    [squared.polynomial(&COS), b * squared.polynomial(&SINC)]
+}
+
+/// q (s, 0, 0, c): turned about its own d1.
+#[inline(always)]
+fn spun_about_d1<S: Simd>(q: Quaternions<S>, [c, s]: [Lanes<S>; 2]) -> Quaternions<S> {
+    let (r, w) = (q.vector, q.scalar);
+    Quaternions {
+        vector: Vectors::new(
+            r.x.mul_add(c, w * s),
+            r.y.mul_add(c, r.z * s),
+            r.y.neg_mul_add(s, r.z * c),
+        ),
+        scalar: r.x.neg_mul_add(s, w * c),
+    }
+}
+
+/// q (0, s, 0, c): turned about its own d2.
+#[inline(always)]
+fn spun_about_d2<S: Simd>(q: Quaternions<S>, [c, s]: [Lanes<S>; 2]) -> Quaternions<S> {
+    let (r, w) = (q.vector, q.scalar);
+    Quaternions {
+        vector: Vectors::new(
+            r.z.neg_mul_add(s, r.x * c),
+            r.y.mul_add(c, w * s),
+            r.z.mul_add(c, r.x * s),
+        ),
+        scalar: r.y.neg_mul_add(s, w * c),
+    }
+}
+
+/// q (0, 0, s, c): turned about its own d3.
+#[inline(always)]
+fn spun_about_d3<S: Simd>(q: Quaternions<S>, [c, s]: [Lanes<S>; 2]) -> Quaternions<S> {
+    let (r, w) = (q.vector, q.scalar);
+    Quaternions {
+        vector: Vectors::new(
+            r.x.mul_add(c, r.y * s),
+            r.x.neg_mul_add(s, r.y * c),
+            r.z.mul_add(c, w * s),
+        ),
+        scalar: r.z.neg_mul_add(s, w * c),
     }
 }
 

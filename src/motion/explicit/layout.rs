@@ -178,10 +178,8 @@ pub struct NodeData {
     pub mass: f64,
     /// 1/mass; zero for a held node, and for a shared tip.
     pub inverse_mass: f64,
-    /// 1/J of a node about d2 and d3; zero for a held node.
-    pub inverse_inertia: f64,
-    /// 1/J1 - 1/J.
-    pub inverse_spin_excess: f64,
+    /// 1/J1, 1/J2 and 1/J3 of a node; zero for a held node.
+    pub inverse_inertia: [f64; 3],
     /// Length of rod whose loads act on the node.
     pub load_length: f64,
     /// Fraction of the length whose coupling to the rods before and after acts on the node.
@@ -208,8 +206,13 @@ pub struct BlockMaterial {
     pub rest_moment: [[f64; NODES_PER_BLOCK]; 3],
     pub mass: [f64; NODES_PER_BLOCK],
     pub inverse_mass: [f64; NODES_PER_BLOCK],
+    /// Whether all nodes have the same inertia about d2 and d3: besides their rotation about the angular momentum they
+    /// spin about d1 alone.
+    pub spins_about_d1: bool,
+    /// 1/J2 if they do, else 1/J1, the least one of plane sections: no part of a rotation is then larger than the whole.
     pub inverse_inertia: [f64; NODES_PER_BLOCK],
-    pub inverse_spin_excess: [f64; NODES_PER_BLOCK],
+    /// The excess over that of 1/J1, and zero; else that of 1/J2 and of 1/J3.
+    pub inverse_spin_excess: [[f64; NODES_PER_BLOCK]; 2],
     pub load_length: [f64; NODES_PER_BLOCK],
     pub coupling_weights: [[f64; NODES_PER_BLOCK]; 2],
 }
@@ -229,8 +232,17 @@ impl BlockMaterial {
             let straight = [&node.rest_turn, &node.rest_length].map(|rest| rest[1..] == [0.0, 0.0]);
             bend_2 == bend_3 && shear_2 == shear_3 && straight == [true; 2]
         };
+        let spins_about_d1 = { nodes.iter() }.all(|node| {
+            let [_, about_2, about_3] = node.inverse_inertia;
+            about_2 == about_3
+        });
+        let (base, spins) = match spins_about_d1 {
+            true => (1, [0, 1]),
+            false => (0, [1, 2]),
+        };
         BlockMaterial {
             round: nodes.iter().all(round),
+            spins_about_d1,
             shear: gather(&|node| node.stretch_stiffness[1]),
             stretch_excess: [0, 2]
                 .map(|c| gather(&|node| node.stretch_stiffness[c] - node.stretch_stiffness[1])),
@@ -244,8 +256,10 @@ impl BlockMaterial {
                 .map(|c| gather(&|node| node.bending_stiffness[c] * node.rest_turn[c])),
             mass: gather(&|node| node.mass),
             inverse_mass: gather(&|node| node.inverse_mass),
-            inverse_inertia: gather(&|node| node.inverse_inertia),
-            inverse_spin_excess: gather(&|node| node.inverse_spin_excess),
+            inverse_inertia: gather(&|node| node.inverse_inertia[base]),
+            inverse_spin_excess: spins.map(|axis| {
+                gather(&|node| node.inverse_inertia[axis] - node.inverse_inertia[base])
+            }),
             load_length: gather(&|node| node.load_length),
             coupling_weights: [0, 1].map(|side| gather(&|node| node.coupling_weights[side])),
         }

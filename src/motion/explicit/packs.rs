@@ -182,8 +182,7 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
     if !free.is_fixed() {
         let inertia = physics.inertia(leaf, j, i);
         if free.rotation {
-            node.inverse_inertia = 1.0 / inertia.transverse;
-            node.inverse_spin_excess = 1.0 / inertia.polar() - 1.0 / inertia.transverse;
+            node.inverse_inertia = inertia.principal.recip().to_array();
         }
         if free.displacement.any() && (i < n || !joined) {
             node.mass = inertia.mass;
@@ -257,9 +256,17 @@ impl Pack {
 
     /// Angular velocity of a node with rotation `q` and angular momentum `p`.
     pub fn angular_velocity(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
-        let d1 = q * DVec3::X;
         let NodeMaterial { block, node } = self.node_material(at);
-        p * block.inverse_inertia[node] + d1 * (d1.dot(p) * block.inverse_spin_excess[node])
+        let about = |axis: DVec3, excess: f64| axis * (axis.dot(p) * excess);
+        let isotropic = p * block.inverse_inertia[node];
+        match block.spins_about_d1 {
+            true => isotropic + about(q * DVec3::X, block.inverse_spin_excess[0][node]),
+            false => {
+                let [excess_2, excess_3] = &block.inverse_spin_excess;
+                let transverse = about(q * DVec3::Y, excess_2[node]);
+                isotropic + transverse + about(q * DVec3::Z, excess_3[node])
+            }
+        }
     }
 
     /// The quaternion of a node, normalized at intervals only.

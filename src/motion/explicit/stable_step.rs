@@ -66,14 +66,14 @@ impl StableStep {
         }
         let springs = leaf.spring_frequency_bound(|j, i| {
             let inertia = physics.inertia(leaf, j, i);
-            [inertia.transverse.min(inertia.polar()), inertia.mass]
+            [inertia.principal.min_element(), inertia.mass]
         });
         if springs > strains.max(coupling).max(tissue) {
             limit = "the springs of supports";
         }
         let levers = leaf.lever_frequency_bound(|j, i| {
             let inertia = physics.inertia(leaf, j, i);
-            inertia.transverse.min(inertia.polar())
+            inertia.principal.min_element()
         });
         if levers > strains.max(coupling).max(tissue).max(springs) {
             limit = "the levers of loads off the axis";
@@ -159,8 +159,7 @@ fn fastest_segment(leaf: &DiscreteLeaf, physics: &Physics, state: &State) -> Fas
                 true => DVec3::splat(tip_mass * shift.max_element() / tip),
                 false => inertia.mass * shift / held[node].displacement,
             };
-            let (j1, j2) = (inertia.polar(), inertia.transverse);
-            let turning = DVec3::new(j1, j2, j2) * turn / held[node].rotation;
+            let turning = inertia.principal * turn / held[node].rotation;
             let frame = DMat3::from_quat(state.q[node]);
             [(moving, free.displacement.any()), (turning, free.rotation)].map(|(mass, free)| {
                 match free {
@@ -288,7 +287,7 @@ fn tissue_frequency_bound(leaf: &DiscreteLeaf, physics: &Physics, state: &State)
             false => NodeFreedom::FREE,
         };
         let part = |free: bool| if free { 1.0 / share } else { 0.0 };
-        let turning = inertia.polar().min(inertia.transverse);
+        let turning = inertia.principal.min_element();
         [
             part(free.rotation) / turning,
             part(free.displacement.any()) / inertia.mass,
@@ -375,10 +374,9 @@ pub fn set_fictitious_masses(
             if i == n {
                 tip += mass;
             }
-            node.inverse_spin_excess = 0.0;
             // Zero for a held node, and for a shared tip.
-            if node.inverse_inertia != 0.0 {
-                node.inverse_inertia = 1.0 / inertia;
+            if node.inverse_inertia != [0.0; 3] {
+                node.inverse_inertia = [1.0 / inertia; 3];
             }
             if node.inverse_mass != 0.0 {
                 node.mass = mass;

@@ -244,10 +244,7 @@ impl SemiImplicit {
             .zip(&self.node_motions)
             .zip(&self.state.q);
         let energy = |((inertia, motion), q): ((&Inertia, &NodeMotion), &DQuat)| {
-            let [angular, linear] = motion.v;
-            let turning = angular.dot(inertia.tensor(*q) * angular);
-            let coupled = inertia.first_moment(*q).dot(linear.cross(angular));
-            0.5 * (inertia.mass * linear.length_squared() + turning) + coupled
+            inertia.kinetic_energy(*q, motion.v)
         };
         nodes.map(energy).sum()
     }

@@ -13,7 +13,7 @@
 //! | stretch and shear | H1 = E h t, H2 = f G h t, H3 = 5/6 G h t |
 //! | tissue | rigid along (k1) and normal to the veins (k3), k2 = E' t/(D w), c1 = E' t^3/(12 D w) |
 //! | contraction | nu w, with D = 1 - nu^2 E'/E |
-//! | inertia | rho t h, about d1 rho t h (l^2 + t^2)/12, about d2 rho h t^3/12 |
+//! | inertia | rho t h, about d2 rho h t^3/12, about d3 rho t h l^2/12, about d1 their sum |
 //!
 //! So veins that slide past each other shear their strips, not the tissue besides, and a strip that bends or stretches
 //! curves or narrows the gaps beside it: a blade is a plate that is bent, stretched and sheared in strips.

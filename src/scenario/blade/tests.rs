@@ -1,7 +1,7 @@
 //! What is read of a blade, refused, and written again; and the veins that follow from it.
 
 use crate::natural::Natural;
-use crate::scenario::{Entries, PolarInertia, Profile, Scenario};
+use crate::scenario::{Entries, PolarInertia, Profile, Rod, Scenario};
 use glam::DVec3;
 use leafdyn_testing::pairs;
 use serde_json::json;
@@ -205,11 +205,17 @@ fn stiffnesses_are_those_of_strips_of_the_plate() {
     constant(8e-6 * h * t, &leaf.dynamics.density[1]);
     constant(8e-6 * 1.5 * 5.0 / 48.0 * t, &leaf.dynamics.density[0]);
     let inertia = 8e-6 * h * t / 12.0;
-    constant(inertia * t * t, &leaf.dynamics.rotary_inertia[1]);
-    let PolarInertia::PerLength(polar) = &leaf.dynamics.polar_inertia else {
-        panic!("{:?}", leaf.dynamics.polar_inertia);
+    let [face, plane] = &leaf.dynamics.rotary_inertia[1];
+    constant(inertia * t * t, face);
+    constant(inertia * w * w, plane);
+    assert_eq!(leaf.dynamics.polar_inertia, PolarInertia::Sum);
+    // Turned in its plane as a whole it has the inertia of its width: rho t W^3/12.
+    let turned = |(rod, j): (&Rod, usize)| {
+        let inertia = leaf.dynamics.rotary_inertia[j][1].at(0.0);
+        inertia + leaf.dynamics.density[j].at(0.0) * rod.base[1].powi(2)
     };
-    constant(inertia * (w * w + t * t), &polar[1]);
+    let whole: f64 = leaf.rods.iter().zip(0..).map(turned).sum();
+    assert!((whole / (8e-6 * t * 1.5_f64.powi(3) / 12.0) - 1.0).abs() < 1e-14);
     // The mass is that of the outline, the stiffness that of at least a tenth of its width.
     let leaf = blade_with_overrides("").unwrap();
     let blade = leaf.blade.as_ref().unwrap();

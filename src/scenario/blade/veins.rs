@@ -27,11 +27,9 @@ pub(in crate::scenario) enum BladeProperty {
     Rest(usize),
     /// Mass per length.
     Density,
-    /// Moment of inertia per length about d2, by which a strip resists that its face turns; about d3 the same
-    /// is taken.
-    RotaryInertia,
-    /// Moment of inertia per length about d1.
-    PolarInertia,
+    /// Squared radii of gyration of a strip about d2 and d3, by index: t^2/12 by which it resists that its face turns, and
+    /// l^2/12 with the lever of bending in the plane, with which the whole blade has the inertia of its width.
+    SquaredGyration(usize),
     /// k2 of tissue.
     Across,
     /// c1 of tissue.
@@ -46,7 +44,7 @@ impl From<Property> for BladeProperty {
             Property::Couple(axis) => BladeProperty::Couple(axis),
             Property::Force(axis) => BladeProperty::Force(axis),
             Property::Density => BladeProperty::Density,
-            Property::RotaryInertia => BladeProperty::RotaryInertia,
+            Property::SquaredGyration(axis) => BladeProperty::SquaredGyration(axis),
         }
     }
 }
@@ -70,8 +68,7 @@ impl BladeProperty {
             BladeProperty::Force(axis) => 3 + axis,
             BladeProperty::Rest(axis) => REST_CURVATURES.start + axis,
             BladeProperty::Density => DENSITY,
-            BladeProperty::RotaryInertia => DENSITY + 1,
-            BladeProperty::PolarInertia => DENSITY + 2,
+            BladeProperty::SquaredGyration(axis) => DENSITY + 1 + axis,
             BladeProperty::Across => 0,
             BladeProperty::Fold => 1,
             BladeProperty::Contraction => 2,
@@ -318,20 +315,16 @@ impl BladeVein {
         [a1, a2, a3, young * h * t, h2, h3]
     }
 
-    /// The mass per length and its moments of inertia about d2 and d1, of the blade's own width: also where
+    /// The mass per length and its squared radii of gyration about d2 and d3, of the blade's own width: also where
     /// stiffnesses follow from a larger one.
-    fn mass_and_inertia(&self, sigma: f64, material: &LocalMaterial) -> [f64; 3] {
+    fn mass_and_gyration(&self, sigma: f64, material: &LocalMaterial) -> [f64; 3] {
         let x = self.blade_fraction(sigma);
         let [width, ..] = self.outline.width.value_and_derivatives(x);
         let [h, lever] = self.strip_size(width.max(0.0), x);
         let density = self.material.mass_density.as_ref();
         let density = density.map_or(0.0, |it| it.at(sigma));
-        let (t, mass) = (material.t, density * h * material.t);
-        [
-            mass,
-            mass * t * t / 12.0,
-            mass * (lever * lever + t * t) / 12.0,
-        ]
+        let t = material.t;
+        [density * h * t, t * t / 12.0, lever * lever / 12.0]
     }
 
     /// The property with this index at a fraction of the vein's length, without the others.
@@ -346,7 +339,7 @@ impl BladeVein {
                 self.rest_curvature(self.blade_fraction(sigma))[axis]
             }
             index => {
-                self.mass_and_inertia(sigma, &self.material.local_material(sigma))[index - DENSITY]
+                self.mass_and_gyration(sigma, &self.material.local_material(sigma))[index - DENSITY]
             }
         }
     }
@@ -357,7 +350,7 @@ impl BladeVein {
         let mut all = [0.0; MAX_PROPERTIES];
         all[STIFFNESSES].copy_from_slice(&self.stiffnesses(sigma, &material));
         all[REST_CURVATURES].copy_from_slice(&self.rest_curvature(self.blade_fraction(sigma)));
-        all[DENSITY..].copy_from_slice(&self.mass_and_inertia(sigma, &material));
+        all[DENSITY..].copy_from_slice(&self.mass_and_gyration(sigma, &material));
         all
     }
 }

@@ -215,8 +215,10 @@ keys! {
     Tolerance "solve.tolerance": Number(Finite), [0, 0, 0], Default("1e-6");
     /// rho, mass per length of rod.
     Density "dynamics.density": Quantity(Positive), [-2, 1, 2], Derived;
-    /// rho I, moment of inertia per length about d2 and d3.
+    /// rho I2, moment of inertia per length about d2, and about d3 unless that is given.
     RotaryInertia "dynamics.rotary_inertia": Quantity(Positive), [0, 1, 2], Derived;
+    /// rho I3, moment of inertia per length about d3.
+    RotaryInertia3 "dynamics.rotary_inertia_3": Quantity(Positive), [0, 1, 2], Derived;
     /// radius of the section, in place of rho I.
     SectionRadius "dynamics.section_radius": Quantity(Positive), [1, 0, 0], Derived;
     /// viscous force per length and velocity.

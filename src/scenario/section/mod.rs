@@ -9,7 +9,7 @@
 //! | bending | A2 = E I2, A3 = E I3 |
 //! | axial | H1 = E S |
 //! | shear | H2 = k2 G S, H3 = k3 G S |
-//! | density, rotary inertia | rho S, rho (I2 + I3)/2 |
+//! | density, squared radii of gyration | rho S; I2/S, I3/S |
 //!
 //! The torsion constants J are those of Saint-Venant (S. P. Timoshenko and J. N.
 //! Goodier, Theory of Elasticity, 3rd ed., arts. 107 to 109), the shear factors k
@@ -195,14 +195,13 @@ pub(super) enum Property {
     Force(usize),
     /// Mass per length.
     Density,
-    /// Moment of inertia per length: the mean of those about d2 and d3, which is half of
-    /// that about d1.
-    RotaryInertia,
+    /// Squared radii of gyration about d2 and d3, by index: rotary inertia per mass.
+    SquaredGyration(usize),
 }
 
 impl Property {
-    const ALL: [Property; 8] = {
-        use Property::{Couple, Density, Force, RotaryInertia};
+    const ALL: [Property; 9] = {
+        use Property::{Couple, Density, Force, SquaredGyration};
         [
             Couple(0),
             Couple(1),
@@ -211,7 +210,8 @@ impl Property {
             Force(1),
             Force(2),
             Density,
-            RotaryInertia,
+            SquaredGyration(0),
+            SquaredGyration(1),
         ]
     };
 
@@ -221,7 +221,7 @@ impl Property {
             Property::Couple(axis) => axis,
             Property::Force(axis) => 3 + axis,
             Property::Density => 6,
-            Property::RotaryInertia => 7,
+            Property::SquaredGyration(axis) => 7 + axis,
         }
     }
 }
@@ -411,7 +411,7 @@ impl Section {
             Property::Force(0) => young * area,
             Property::Force(axis) => self.shear_factors_at(place)[axis - 1] * shear * area,
             Property::Density => self.mass_density.at(place) * area,
-            Property::RotaryInertia => 0.5 * self.mass_density.at(place) * (second[0] + second[1]),
+            Property::SquaredGyration(axis) => second[axis] / area,
         }
     }
 
@@ -813,7 +813,8 @@ mod tests {
             (Property::Force(1), factor * shear * area),
             (Property::Force(2), factor * shear * area),
             (Property::Density, 3.0 * area),
-            (Property::RotaryInertia, 3.0 * i),
+            (Property::SquaredGyration(0), 0.2_f64.powi(2) / 16.0),
+            (Property::SquaredGyration(1), 0.2_f64.powi(2) / 16.0),
         ] {
             close(circle.property_value(property, 0.5), value, 1e-14);
         }
@@ -831,9 +832,11 @@ mod tests {
             ellipse.property_value(Property::Force(1), 0.0)
                 > ellipse.property_value(Property::Force(2), 0.0)
         );
-        let second = PI / 64.0 * 0.4 * 0.1 * (0.16 + 0.01);
-        let inertia = ellipse.property_value(Property::RotaryInertia, 0.0);
-        close(inertia, 1.5 * second, 1e-14);
+        // It turns more easily out of its plane: (diameter/4)^2.
+        for (axis, gyration) in [0.1 / 4.0, 0.4 / 4.0].into_iter().enumerate() {
+            let squared = ellipse.property_value(Property::SquaredGyration(axis), 0.0);
+            close(squared, gyration * gyration, 1e-14);
+        }
     }
 
     #[test]

@@ -156,7 +156,11 @@ fn changes_small_motions(key: Key) -> bool {
     key.path().starts_with("wind.")
         || matches!(
             key,
-            Key::Density | Key::RotaryInertia | Key::ExternalDamping | Key::InternalDamping
+            Key::Density
+                | Key::RotaryInertia
+                | Key::RotaryInertia3
+                | Key::ExternalDamping
+                | Key::InternalDamping
         )
 }
 

@@ -347,6 +347,19 @@ mass = 0.2
         boundary: None,
     },
     TestLeaf {
+        name: "flat",
+        text: "
+leaf = { rods = 1, length = 1.0, fan = [0.2] }
+rest = { bend_2 = 0.6 }
+[load]
+tip_force = [0.1, 0.4, -0.3]
+gravity = [0.0, 0.3, -0.6]
+",
+        vary: PULLS,
+        free: BENDS,
+        boundary: None,
+    },
+    TestLeaf {
         name: "struck",
         text: "
 leaf = { rods = 1, length = 1.0, fan = [0.2] }
@@ -405,6 +418,14 @@ impl TestLeaf {
             true => "[dynamics]\nduration = 0.1\ninternal_damping = 1e-3\n".into(),
             false => stiffness("90.0", "0.3"),
         };
-        format!("name = \"{}\"\n{}{stiffness}", self.name, self.text)
+        // In the table with which the stiffnesses end.
+        let inertia = match self.name {
+            "flat" => "rotary_inertia = 0.02\n",
+            _ => "",
+        };
+        format!(
+            "name = \"{}\"\n{}{stiffness}{inertia}",
+            self.name, self.text
+        )
     }
 }

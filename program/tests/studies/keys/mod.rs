@@ -42,7 +42,7 @@ unbend | veins beside rooted mixed gripped rollers founded oval following windy 
 unbend | twisted | dead moments have no potential
 unbend | pinned jaws | the force of a holder does not follow
 unbend | gripped-in-wind | the forces of grips do not follow
-unbend | pulled moving struck photographed ruled prism gutter fibrous | give the blade's normal
+unbend | pulled moving flat struck photographed ruled prism gutter fibrous | give the blade's normal
 ";
 
 /// What is answered without the numbers that were asked for, and must say so: verbs | leaves or keys |
@@ -103,7 +103,7 @@ impl Found {
 /// tip.
 fn data(place: &Workplace, leaf: &TestLeaf) -> String {
     let ask = |verb| ask(place, verb, leaf, None).unwrap();
-    if leaf.name == "moving" {
+    if leaf.name == "moving" || leaf.name == "flat" {
         let frequency = ask(Verb::Modes)
             .numbers
             .first()

@@ -258,6 +258,12 @@ pub fn rows(key: Key) -> Vec<Row> {
             Acts::Inertia,
             false,
         )],
+        Key::RotaryInertia3 => vec![row(
+            "flat",
+            "dynamics.rotary_inertia_3=0.08",
+            Acts::Inertia,
+            false,
+        )],
         Key::SectionRadius => vec![row(
             "moving",
             "dynamics.section_radius=0.4",
