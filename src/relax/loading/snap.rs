@@ -7,9 +7,10 @@
 //! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
 //! is Newton's method.
 
-use crate::leaf::BucklingMode;
+use crate::homotopy::{StepEnd, StepSizes};
+use crate::leaf::{BucklingMode, State};
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};
-use crate::relax::loading::LoadPath;
+use crate::relax::loading::{LoadPath, LoadStepOutcome, PathState};
 use crate::relax::path::StabilityLoss;
 use crate::relax::saddle::{
     SideOfSaddle, converge_saddle, displace, escape_saddle, find_unstable_mode, index,
@@ -69,6 +70,16 @@ const MOTION: ViscousMotion = ViscousMotion {
 /// A leaf that moves no farther (lengths, radians) has not snapped.
 const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
 
+/// Steps back along the path from an equilibrium to which the leaf has moved, as parts of the way to the last one before:
+/// beside a bifurcation of a nearly perfect leaf they are short.
+const RETURN_STEPS: StepSizes = StepSizes {
+    first: 0.25,
+    shortest: 1e-5,
+    longest: 0.25,
+    growth: 2.0,
+    failure: 0.5,
+};
+
 impl LoadPath<'_> {
     /// From the unstable equilibrium in which Newton's method has put the next state the leaf
     /// turns to one of its sides.
@@ -93,6 +104,11 @@ impl LoadPath<'_> {
                 Err(stop) => stopped = stop,
             }
         }
+        if let Some(side) = self.only_continuation(part, &found) {
+            self.next = side;
+            self.record_event(part, StabilityLoss::BentSharply);
+            return Ok(());
+        }
         let side = lower_energy_side(found).ok_or(stopped)?;
         self.next = side.state;
         let equally_open = side.equally_open;
@@ -107,9 +123,72 @@ impl LoadPath<'_> {
         let before = self.next.clone();
         self.relax_next_state()?;
         if before.distance(&self.next) > LARGEST_CONTINUOUS_MOTION {
-            self.record_event(part, StabilityLoss::Snapped);
+            let lost = match self.leads_back(part) {
+                true => StabilityLoss::BentSharply,
+                false => StabilityLoss::Snapped,
+            };
+            self.record_event(part, lost);
         }
         Ok(())
+    }
+
+    /// The one of two sides from which the path leads back to the last equilibrium, if it does so from one alone: then
+    /// nothing was lost, and the other side is one of another path. Beside a bifurcation of a perfect leaf it leads back
+    /// from both.
+    fn only_continuation(&mut self, part: f64, sides: &[Option<SideOfSaddle>; 2]) -> Option<State> {
+        let [Some(one), Some(other)] = sides else {
+            return None;
+        };
+        let [one, other] = [one, other].map(|side| side.state.clone());
+        let leads_back = [&one, &other].map(|side| {
+            self.next.clone_from(side);
+            self.leads_back(part)
+        });
+        match leads_back {
+            [true, false] => Some(one),
+            [false, true] => Some(other),
+            _ => None,
+        }
+    }
+
+    /// Whether slow unloading leads from the next state, at this part, to the last one before it, stably all the way.
+    /// The next state stays as it is.
+    fn leads_back(&mut self, part: f64) -> bool {
+        let arrived = self.next.clone();
+        let (before, reached) = (std::mem::take(&mut self.previous_states), self.lambda);
+        let Some(last) = before.last() else {
+            return false;
+        };
+        let from = last.lambda;
+        self.previous_states.push(PathState {
+            lambda: part,
+            state: arrived.clone(),
+        });
+        let back = RETURN_STEPS.follow(|step| {
+            if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
+                return StepEnd::Ended(EquilibriumFailure::StepLimit);
+            }
+            let to = part + step.to * (from - part);
+            let stable = matches!(self.step_to(to, false), LoadStepOutcome::Stable(_));
+            // A leaf that moves farther may have come to another path.
+            let last = self.previous_states.last();
+            let moved = last.map_or(0.0, |last| self.next.distance(&last.state));
+            match stable && moved <= LARGEST_CONTINUOUS_MOTION {
+                true => {
+                    self.accept(to);
+                    StepEnd::Made {
+                        growth: RETURN_STEPS.growth,
+                    }
+                }
+                false => StepEnd::TooLong(EquilibriumFailure::NoDescent),
+            }
+        });
+        let there = back.is_ok() && self.next.distance(&last.state) <= LARGEST_CONTINUOUS_MOTION;
+        (self.previous_states, self.lambda) = (before, reached);
+        self.next = arrived;
+        self.loading.carry_to_lambda([part; 2], &mut self.next);
+        self.system.set_coupling(&self.loading.leaf);
+        there
     }
 
     /// Moves the next state to rest, leaving saddles.
