@@ -47,7 +47,7 @@ struct GrowthSurvey {
     /// Growth besides that rounding makes of two equal frequencies: of a root as small as the smallest, of others times
     /// the square of their ratio.
     rounding: f64,
-    /// Roots beyond the first one that grows, which may have another place on finer grids.
+    /// Roots beyond the last one that grows, which may have another place on finer grids.
     further: usize,
     /// Largest number of roots that are then computed on all grids.
     most_roots: usize,
@@ -389,7 +389,7 @@ enum GrowthReach {
     TooLarge,
 }
 
-/// Where among all roots on a coarse grid the first is that grows.
+/// Where among all roots on a coarse grid those are that grow: the last that can be reached or, if none can, the first.
 fn growth_reach(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
@@ -430,8 +430,10 @@ fn growth_reach(
         let rounding = SURVEY.rounding * (it.size() / smallest).powi(2);
         it.growth > (SURVEY.growth + rounding) * it.size()
     };
-    let first = roots.iter().position(grows);
-    GrowthReach::Within(first.map_or(0, |first| first + 1 + SURVEY.further))
+    let growing = roots.iter().enumerate().filter(|(_, it)| grows(it));
+    let reaches: Vec<usize> = growing.map(|(k, _)| k + 1 + SURVEY.further).collect();
+    let within = reaches.iter().rfind(|reach| **reach <= SURVEY.most_roots);
+    GrowthReach::Within(within.or(reaches.first()).copied().unwrap_or(0))
 }
 
 /// How the roots on the coarsest grid change with the compliance by which the matrices of nearly rigid segments are

@@ -189,17 +189,19 @@ fn a_damped_cantilever_moves_in_its_undamped_modes() {
         for (k, (mode, shape)) in modes.iter().zip(shapes_of(&leaf)).enumerate() {
             let half = 0.5 * (external + internal * mode.eigenvalue);
             let frequency = (mode.eigenvalue - half * half).sqrt();
-            close("growth rate", motions.growth_rates[k], -half, 1e-6);
-            close("frequency", motions.frequencies[k], frequency, 1e-6);
+            // Matrices are softened; eigenvalues with a potential are told without it.
+            let rounding = 5e-5 * frequency;
+            close("growth rate", motions.growth_rates[k], -half, rounding);
+            close("frequency", motions.frequencies[k], frequency, rounding);
             let undamped = mode.displacement[0].iter().zip(&mode.rotation[0]);
             let now = shape.displacement[0].iter().zip(&shape.rotation[0]);
             for ((d, r), (wanted_d, wanted_r)) in now.zip(undamped) {
                 let apart = (*d - *wanted_d).length().max((*r - *wanted_r).length());
-                assert!(apart < 1e-6, "{dynamics} {k}: {apart:e}");
+                assert!(apart < 5e-5, "{dynamics} {k}: {apart:e}");
             }
             let later = shape.later_displacement[0].iter();
             let later = later.fold(0.0_f64, |largest, node| largest.max(node.length()));
-            assert!(later < 1e-6, "{dynamics} {k}: {later:e}");
+            assert!(later < 5e-5, "{dynamics} {k}: {later:e}");
         }
     }
 }
@@ -251,6 +253,11 @@ fn drag_puts_nodes_out_of_phase() {
         close("largest displacement", size(&shape.displacement), 1.0, 1e-9);
         assert_eq!(shape.displacement[0][0], DVec3::ZERO);
     }
-    let later = shapes[0].later_displacement[0].iter();
-    assert!(later.fold(0.0_f64, |m, it| m.max(it.length())) > 1e-3);
+    let later = shapes.iter().map(|shape| {
+        let nodes = shape.later_displacement[0].iter();
+        nodes.fold(0.0_f64, |m, it| m.max(it.length()))
+    });
+    let later: Vec<f64> = later.collect();
+    assert!(later.iter().all(|it| *it > 1e-6), "{later:?}");
+    assert!(later.iter().any(|it| *it > 1e-4), "{later:?}");
 }

@@ -210,22 +210,21 @@ fn random_leaf(seed: u64, with: &[&str]) -> String {
     );
     let has = |what: &str| with.contains(&what);
     let strength = if has("grows") { 12.0 } else { 1.0 };
-    let mut load = format!("gravity = {}", numbers.list(3, -0.4, 0.4));
+    let mut load = format!("[load]\ngravity = {}\n", numbers.list(3, -0.4, 0.4));
     if has("follower") {
         let [along, beside] = [(-1.0, 0.0), (-0.3, 0.3)].map(|(low, high)| {
             let of = numbers.between(low, high);
             strength * of
         });
-        load += &format!(", follower = [{along:?}, {beside:?}, 0.2]");
+        load += &format!("follower = [{along:?}, {beside:?}, 0.2]\n");
     }
     if has("couple") {
         load += &format!(
-            ", couple = {}, couple_follows = {}",
+            "couple = {}\ncouple_follows = {}\n",
             numbers.list(3, -0.3, 0.3),
             numbers.unit() < 0.5
         );
     }
-    text += &format!("load = {{ {load} }}\n");
     let external = if has("external") {
         numbers.between(0.1, 1.0)
     } else {
@@ -253,6 +252,7 @@ fn random_leaf(seed: u64, with: &[&str]) -> String {
             numbers.list(3, 0.5, 8.0)
         );
     }
+    text += &load;
     if has("point") {
         text += &format!(
             "[[load.point]]\nvein = 1\nat = 1.0\nforce = {}\nmoment = {}\nfollows = true\n",
@@ -331,7 +331,9 @@ fn told_motions_of_random_leaves_are_those_of_a_dense_matrix() {
             };
             (0.02 * least..1.2 * least).contains(&growth(root))
         });
-        if doubtful {
+        // Motions that grow are found among the slowest sixty.
+        let far = roots.iter().skip(50).any(|root| growth(root) > 1e-5);
+        if doubtful || far {
             continue;
         }
         compared += 1;

@@ -8,7 +8,7 @@
 //! is Newton's method.
 
 use crate::homotopy::{StepEnd, StepSizes};
-use crate::leaf::{BucklingMode, State};
+use crate::leaf::{BucklingMode, NodalField, State};
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};
 use crate::relax::loading::{LoadPath, LoadStepOutcome, PathState};
 use crate::relax::path::StabilityLoss;
@@ -80,6 +80,31 @@ const RETURN_STEPS: StepSizes = StepSizes {
     failure: 0.5,
 };
 
+/// Least amplitude of the mode (lengths, radians) by which a leaf moves between an equilibrium before a bifurcation and
+/// the unstable one behind it that is no rounding.
+const LEAST_IMPERFECTION: f64 = 1e-6;
+
+/// The amplitude of a mode in which the last equilibrium before a bifurcation differs from the unstable one behind it:
+/// zero of a perfect leaf. An imperfect one has e/|m| before and -e/m behind, where 0 = e + m a - a^3 for an
+/// imperfection e (M. Golubitsky and D. Schaeffer, Singularities and Groups in Bifurcation Theory I, 1985), and bends to
+/// the side of e.
+fn imperfection(before: &State, behind: &State, mode: &NodalField, first: usize) -> f64 {
+    let mut way = NodalField::new();
+    behind.increments_to(before, first, &mut way);
+    let product = |a: &NodalField, b: &NodalField| -> f64 {
+        let a = a.iter().flatten().flatten();
+        a.zip(b.iter().flatten().flatten())
+            .map(|(a, b)| a * b)
+            .sum()
+    };
+    let largest = mode
+        .iter()
+        .flatten()
+        .flatten()
+        .fold(0.0_f64, |m, it| m.max(it.abs()));
+    largest * product(&way, mode) / product(mode, mode)
+}
+
 impl LoadPath<'_> {
     /// From the unstable equilibrium in which Newton's method has put the next state the leaf
     /// turns to one of its sides.
@@ -91,6 +116,8 @@ impl LoadPath<'_> {
             return Err(EquilibriumFailure::NoDescent);
         }
         let mode = self.system.solution();
+        let last = self.previous_states.last().expect("states");
+        let amplitude = imperfection(&last.state, &saddle, &mode, leaf.first_node());
         let mut found: [Option<SideOfSaddle>; 2] = [None, None];
         let mut stopped = EquilibriumFailure::NoDescent;
         for (found, sign) in found.iter_mut().zip([1.0, -1.0]) {
@@ -104,7 +131,7 @@ impl LoadPath<'_> {
                 Err(stop) => stopped = stop,
             }
         }
-        if let Some(side) = self.only_continuation(part, &found) {
+        if let Some(side) = self.only_continuation(part, &found, amplitude) {
             self.next = side;
             self.record_event(part, StabilityLoss::BentSharply);
             return Ok(());
@@ -134,8 +161,13 @@ impl LoadPath<'_> {
 
     /// The one of two sides from which the path leads back to the last equilibrium, if it does so from one alone: then
     /// nothing was lost, and the other side is one of another path. Beside a bifurcation of a perfect leaf it leads back
-    /// from both.
-    fn only_continuation(&mut self, part: f64, sides: &[Option<SideOfSaddle>; 2]) -> Option<State> {
+    /// from both, and of one so nearly perfect that the other path cannot be told apart: then the imperfection decides.
+    fn only_continuation(
+        &mut self,
+        part: f64,
+        sides: &[Option<SideOfSaddle>; 2],
+        amplitude: f64,
+    ) -> Option<State> {
         let [Some(one), Some(other)] = sides else {
             return None;
         };
@@ -147,6 +179,8 @@ impl LoadPath<'_> {
         match leads_back {
             [true, false] => Some(one),
             [false, true] => Some(other),
+            [true, true] if amplitude > LEAST_IMPERFECTION => Some(one),
+            [true, true] if amplitude < -LEAST_IMPERFECTION => Some(other),
             _ => None,
         }
     }
