@@ -74,10 +74,10 @@ const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
 /// beside a bifurcation of a nearly perfect leaf they are short.
 const RETURN_STEPS: StepSizes = StepSizes {
     first: 0.25,
-    shortest: 1e-5,
+    shortest: 1e-3,
     longest: 0.25,
     growth: 2.0,
-    failure: 0.5,
+    failure: 0.25,
 };
 
 /// Least amplitude of the mode (lengths, radians) by which a leaf moves between an equilibrium before a bifurcation and
@@ -159,9 +159,9 @@ impl LoadPath<'_> {
         Ok(())
     }
 
-    /// The one of two sides from which the path leads back to the last equilibrium, if it does so from one alone: then
-    /// nothing was lost, and the other side is one of another path. Beside a bifurcation of a perfect leaf it leads back
-    /// from both, and of one so nearly perfect that the other path cannot be told apart: then the imperfection decides.
+    /// Of an imperfect leaf the one of two sides from which the path leads back to the last equilibrium: then nothing was
+    /// lost, and the other side is one of another path. Where that path is too near to be told apart it leads back from
+    /// both, and the imperfection decides.
     fn only_continuation(
         &mut self,
         part: f64,
@@ -171,6 +171,9 @@ impl LoadPath<'_> {
         let [Some(one), Some(other)] = sides else {
             return None;
         };
+        if amplitude.abs() <= LEAST_IMPERFECTION {
+            return None;
+        }
         let [one, other] = [one, other].map(|side| side.state.clone());
         let leads_back = [&one, &other].map(|side| {
             self.next.clone_from(side);
@@ -179,9 +182,9 @@ impl LoadPath<'_> {
         match leads_back {
             [true, false] => Some(one),
             [false, true] => Some(other),
-            [true, true] if amplitude > LEAST_IMPERFECTION => Some(one),
-            [true, true] if amplitude < -LEAST_IMPERFECTION => Some(other),
-            _ => None,
+            [true, true] if amplitude > 0.0 => Some(one),
+            [true, true] => Some(other),
+            [false, false] => None,
         }
     }
 
