@@ -341,3 +341,39 @@ impl SpringRate {
         self.now = self.factor * self.now.max(MOTION.least_rate);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    /// A column beyond the weight under which a perfect one buckles, a little out of plumb or not.
+    fn column(bending: [f64; 2], push: f64) -> Scenario {
+        let text = format!(
+            r#"
+            name = "column"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+            stiffness = {{ torsion = 1.0, bending_2 = {:?}, bending_3 = {:?}, axial = inf, shear_2 = inf, shear_3 = inf }}
+            load = {{ gravity = [-9.0, 0.0, {push:?}] }}
+            "#,
+            bending[0], bending[1]
+        );
+        Scenario::from_toml(&text).unwrap()
+    }
+
+    #[test]
+    fn an_imperfect_column_bends_to_its_side_and_a_perfect_one_turns_aside() {
+        for push in [4e-6, -4e-6, -2e-4] {
+            let leaf = column([1.0, 1.3], push).relax().unwrap();
+            assert!(leaf.tips[0].z * push > 0.0, "{push}: {}", leaf.tips[0]);
+            let path = leaf.path.unwrap();
+            assert_eq!(path.word(), "stable-throughout", "{push}: {path:?}");
+            assert_eq!(path.events()[0].happening, StabilityLoss::BentSharply);
+        }
+        for bending in [[1.0, 1.3], [1.0, 1.0]] {
+            let leaf = column(bending, 0.0).relax().unwrap();
+            assert_eq!(leaf.path.unwrap().word(), "branched", "{bending:?}");
+            assert!(leaf.work.steps < 500, "{bending:?}: {:?}", leaf.work);
+        }
+    }
+}
