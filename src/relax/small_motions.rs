@@ -153,6 +153,13 @@ impl RootSeries {
         self.damped.drain(..excess(self.damped.len()));
     }
 
+    /// So many motions on the finest grid have those of the series among them: of squares there are two for each that is
+    /// asked for.
+    fn shapes_to_compute(&self) -> usize {
+        let squares = self.squares.last().map_or(0, |it| it.1.len().div_ceil(2));
+        squares.max(self.damped.last().map_or(0, |it| it.1.len()))
+    }
+
     fn extrapolated(&self) -> Option<Vec<ExtrapolatedRoot>> {
         match self.squares.is_empty() {
             true => extrapolate_damped(&self.damped),
@@ -244,6 +251,11 @@ pub fn small_motions(
         GrowthReach::Within(count) if count <= SURVEY.most_roots => count.max(usual),
         _ => usual,
     };
+    // Roots on which the verdict depends: more that are requested may not converge.
+    let needed = match reach {
+        GrowthReach::Within(count) if count <= SURVEY.most_roots => count.max(LEAST_ROOTS),
+        _ => LEAST_ROOTS,
+    };
     let found_all = Cell::new(true);
     let asked = match problem.options.mode_shapes {
         true => problem.options.modes,
@@ -257,10 +269,17 @@ pub fn small_motions(
         let limit = &problem.options.limit;
         let lowest =
             |count| lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit);
-        lowest(wanted).or_else(|| {
-            found_all.set(wanted == usual);
-            if wanted > usual { lowest(usual) } else { None }
-        })
+        let mut count = wanted;
+        loop {
+            match lowest(count) {
+                None if count > needed => count = (count / 2).max(needed),
+                None if needed > LEAST_ROOTS => {
+                    found_all.set(false);
+                    return lowest(LEAST_ROOTS);
+                }
+                found => return found,
+            }
+        }
     };
     let skipped = found.levels.len().saturating_sub(EXTRAPOLATED_GRIDS);
     let mut series = RootSeries::default();
@@ -327,7 +346,7 @@ pub fn small_motions(
         let limit = &problem.options.limit;
         let lowest =
             |count| lowest_shapes(&level.leaf, &physics, &level.state, &forces, count, limit);
-        let motions = lowest(wanted.max(roots.len())).or_else(|| lowest(usual))?;
+        let motions = lowest(series.shapes_to_compute())?;
         let on_finest: Vec<MotionRoot> = listed.iter().map(|it| it.on_finest).collect();
         let curves = &found.levels.last()?.leaf;
         shapes_of_roots(&on_finest, &motions, &level.leaf, curves)
@@ -362,7 +381,7 @@ pub fn small_motions(
         stable,
         instability,
         complete,
-        searched_roots: if found_all.get() { wanted } else { usual },
+        searched_roots: if found_all.get() { needed } else { LEAST_ROOTS },
         assumed,
         shapes,
     })
