@@ -95,14 +95,6 @@ pub enum UnmodelledFeature {
         /// The method or the question.
         what: &'static str,
     },
-    /// Modes of a leaf under loads without a potential.
-    #[error(
-        "{key}: a list of modes does not exist where loads have no potential: growth rates and frequencies of the leaf at rest are those of its small motions; leave out the list, or these loads"
-    )]
-    Modes {
-        /// The key of the loads.
-        key: &'static str,
-    },
     /// Tissue that is rigid where shooting cannot keep it so.
     #[error("tissue.along, tissue.normal = inf: shooting does not solve {what}")]
     RigidTissue {

@@ -4,8 +4,9 @@ use std::iter;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
 
+use glam::DVec3;
 use leafdyn::relax::{
-    BaseReaction, Equilibrium, GripReaction, Mode, NodeState, Sensitivity, Stresses,
+    BaseReaction, Equilibrium, GripReaction, Mode, MotionShape, NodeState, Sensitivity, Stresses,
 };
 use leafdyn::scenario::units::Dimension;
 use leafdyn::scenario::{Scenario, Stress};
@@ -482,17 +483,37 @@ impl Leaf {
         masses.map(all).transpose()
     }
 
-    /// Displacements and rotations of the modes on the finest grid.
-    fn mode_shapes<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 2]> {
-        let modes = self.found.stability.modes.as_deref().unwrap_or_default();
+    /// Displacements and rotations of the modes on the finest grid, and those a quarter of a period later.
+    fn mode_shapes<'py>(&self, py: Python<'py>) -> PyResult<[Bound<'py, PyAny>; 4]> {
+        let modes = self.found.stability.modes.iter().flatten();
+        let in_phase = modes.map(|mode| {
+            let still = |shape: &Vec<Vec<DVec3>>| {
+                let rods = shape.iter().map(|rod| vec![DVec3::ZERO; rod.len()]);
+                rods.collect()
+            };
+            MotionShape {
+                displacement: mode.displacement.clone(),
+                rotation: mode.rotation.clone(),
+                later_displacement: still(&mode.displacement),
+                later_rotation: still(&mode.rotation),
+            }
+        });
+        let motions = self.found.stability.small_motions.as_ref();
+        let motions = motions.and_then(|motions| motions.shapes.clone());
+        let modes: Vec<MotionShape> = in_phase.chain(motions.into_iter().flatten()).collect();
         let shape = modes.first().map(|mode| &mode.displacement);
         let rods = shape.map_or(self.found.rod_count, Vec::len);
         let nodes = shape.and_then(|rods| rods.first()).map_or(0, Vec::len);
-        let of = |shape: fn(&Mode) -> &Vec<Vec<_>>| {
+        let of = |shape: fn(&MotionShape) -> &Vec<Vec<DVec3>>| {
             let vectors = modes.iter().flat_map(shape).flatten().copied();
             array(py, flat(vectors), &[modes.len(), rods, nodes, 3])
         };
-        Ok([of(|mode| &mode.displacement)?, of(|mode| &mode.rotation)?])
+        Ok([
+            of(|mode| &mode.displacement)?,
+            of(|mode| &mode.rotation)?,
+            of(|mode| &mode.later_displacement)?,
+            of(|mode| &mode.later_rotation)?,
+        ])
     }
 
     /// Changes of the positions with each number that was asked for: by its key, where they are

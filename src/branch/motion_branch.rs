@@ -94,6 +94,12 @@ impl MotionBranchPoint {
             (None, motions) => motions.as_ref()?.unstable_roots,
         }
     }
+
+    /// So many roots next to zero have those with growth among them.
+    fn searched_roots(&self) -> usize {
+        let motions = self.leaf.stability.small_motions.as_ref();
+        motions.map_or(0, |motions| motions.searched_roots)
+    }
 }
 
 /// How a branch is followed.
@@ -301,6 +307,7 @@ impl MotionContinuation<'_> {
         let known = |(fraction, unstable_roots), of: &'_ MotionBranchPoint| KnownStability {
             fraction,
             unstable_roots,
+            searched_roots: of.searched_roots(),
             level: of.finest().clone(),
         };
         let located = locate_critical_point(

@@ -76,6 +76,8 @@ pub(crate) struct KnownStability {
     pub fraction: f64,
     /// Roots with growth, both of a conjugate pair.
     pub unstable_roots: usize,
+    /// So many roots next to zero have those with growth among them.
+    pub searched_roots: usize,
     /// The leaf there, on any grid.
     pub level: GridLevel,
 }
@@ -200,6 +202,8 @@ struct GridSearch<'f> {
     /// Balances so far, and states elsewhere to begin with, by their fractions.
     known: Vec<(f64, GridLevel)>,
     ends: [(f64, usize); 2],
+    /// So many roots next to zero are computed: the one whose growth begins may be farther off than many others.
+    searched_roots: usize,
 }
 
 impl<'f> GridSearch<'f> {
@@ -216,6 +220,7 @@ impl<'f> GridSearch<'f> {
             ends: ends
                 .each_ref()
                 .map(|end| (end.fraction, end.unstable_roots)),
+            searched_roots: ends[0].searched_roots.max(ends[1].searched_roots),
         }
     }
 
@@ -242,7 +247,7 @@ impl<'f> GridSearch<'f> {
         };
         let grid = self.grid.clone();
         let level = balance_on_grid(&leaf, StateOnGrid { grid, state }, &self.family.limit)?;
-        let motions = growing_motions(&level, 1.0, &self.family.limit)?;
+        let motions = growing_motions(&level, 1.0, self.searched_roots, &self.family.limit)?;
         self.known.retain(|(at, _)| *at != fraction);
         self.known.push((fraction, level));
         Some(motions)
@@ -356,8 +361,9 @@ impl GridSearch<'_> {
         let softer = |times: f64| {
             let softer = |probe: &GrowingProbe| {
                 let (_, level) = self.known.iter().find(|(at, _)| *at == probe.fraction)?;
-                let slowest = growing_motions(level, times, &self.family.limit)?.slowest()?;
-                Some(GrowingProbe::new(probe.fraction, slowest))
+                let motions =
+                    growing_motions(level, times, self.searched_roots, &self.family.limit)?;
+                Some(GrowingProbe::new(probe.fraction, motions.slowest()?))
             };
             let soft: Option<Vec<GrowingProbe>> = nearest.iter().map(softer).collect();
             soft.map(|probes| Interpolation::of(&probes))

@@ -26,6 +26,7 @@ use crate::modes::node_blocks::NodeBlocks;
 use crate::motion::Physics;
 use crate::newton::FollowerForces;
 use crate::run::Limit;
+use faer::linalg::solvers::Solve;
 use faer::{Mat, c64};
 use glam::{DMat3, DQuat};
 
@@ -53,6 +54,9 @@ const DENSE_ROUNDING: f64 = 1e-6;
 /// Stiffness of springs on all unknowns, in A/L^2, that hold a leaf that can turn without resistance, of which all
 /// roots are computed: with the least ones the others would be lost beside the one that is nearly zero.
 const DENSE_NEUTRAL_SHIFT: f64 = 1e-3;
+
+/// Rotation and displacement of a node in a small motion: complex, as nodes need not move in phase.
+pub type ComplexIncrement = [c64; 6];
 
 /// A root of the linearised motion, or a pair of conjugate ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,7 +98,7 @@ impl MotionRoot {
         MotionRoot::new(root)
     }
 
-    fn new(root: c64) -> Self {
+    pub(super) fn new(root: c64) -> Self {
         MotionRoot {
             growth: root.re,
             frequency: root.im.abs(),
@@ -104,6 +108,24 @@ impl MotionRoot {
     /// The distance from zero.
     pub fn size(self) -> f64 {
         self.growth.hypot(self.frequency)
+    }
+
+    /// The distance from another root.
+    pub fn distance(self, other: MotionRoot) -> f64 {
+        (self.growth - other.growth).hypot(self.frequency - other.frequency)
+    }
+}
+
+impl MotionRoots {
+    /// The roots themselves; of conjugate squares both.
+    pub fn into_roots(self) -> Vec<MotionRoot> {
+        match self {
+            MotionRoots::Squares(squares) => {
+                let roots = squares.iter().map(|it| MotionRoot::from_square(it.value));
+                roots.collect()
+            }
+            MotionRoots::Damped(roots) => roots,
+        }
     }
 }
 
@@ -118,6 +140,8 @@ pub(super) struct LinearizedMotion<'a> {
     /// The equations with rods twice as stiff under the same stresses, if the material is damped: the
     /// difference is their material stiffness.
     stiffened: Option<System>,
+    /// Springs on all unknowns of a leaf that can turn without resistance, in multiples of the system's masses.
+    neutral: f64,
     masses: MassMatrix,
     /// What has no potential as blocks, where the equations are the transposed ones.
     transposed: Option<TransposedForces>,
@@ -283,6 +307,7 @@ impl<'a> LinearizedMotion<'a> {
             solver,
             system,
             stiffened,
+            neutral,
             transposed: None,
         };
         Some((motion, factors))
@@ -333,34 +358,73 @@ impl<'a> LinearizedMotion<'a> {
         c64::new(root.growth - half, root.frequency)
     }
 
+    /// The square lambda^2 + a lambda of a root, whose masses are damped by a.
+    pub(super) fn square_of_root(&self, root: c64) -> c64 {
+        root * (root + self.physics.damping)
+    }
+
     /// The unknowns with mass or damping; the others follow them statically.
     fn moving_unknowns(&self) -> Vec<usize> {
         let size = self.solver.size();
         let damped = self.is_damped_beside_masses();
         let moves = |at: &usize| {
-            let mut unit = vec![0.0; size];
-            unit[*at] = 1.0;
+            let unit = self.unit(*at);
             let acts = |image: &[f64]| image.iter().any(|value| *value != 0.0);
             acts(&self.masses.times(&unit)) || damped && acts(&self.damping(&unit))
         };
         (0..size).filter(moves).collect()
     }
 
-    /// (K - W)^-1 times a matrix that is known by its products, for these unknowns.
+    /// (K - W)^-1 times a matrix that is known by its products, for these unknowns: by the factors of K or, where the
+    /// iteration for W does not converge for one of the columns, by those of the dense matrix. `None` if that is
+    /// singular.
     fn dense_inverse(
         &self,
         factors: &mut MatrixFactors,
         unknowns: &[usize],
         product: &dyn Fn(&[f64]) -> Vec<f64>,
     ) -> Option<Mat<f64>> {
-        let mut columns = Vec::new();
-        for at in unknowns {
-            let mut unit = vec![0.0; self.solver.size()];
-            unit[*at] = 1.0;
-            columns.push(self.inverse(factors, &product(&unit))?);
-        }
+        let columns: Vec<Vec<f64>> = unknowns.iter().map(|at| product(&self.unit(*at))).collect();
+        let iterated = columns.iter().map(|it| self.inverse(factors, it));
+        let solved = match iterated.collect::<Option<Vec<_>>>() {
+            Some(solved) => solved,
+            None => self.solve_dense(&columns)?,
+        };
         let count = unknowns.len();
-        Some(Mat::from_fn(count, count, |r, c| columns[c][unknowns[r]]))
+        Some(Mat::from_fn(count, count, |r, c| solved[c][unknowns[r]]))
+    }
+
+    fn unit(&self, at: usize) -> Vec<f64> {
+        let mut unit = vec![0.0; self.solver.size()];
+        unit[at] = 1.0;
+        unit
+    }
+
+    /// K - W times a vector.
+    fn stiffness(&self, vector: &[f64]) -> Vec<f64> {
+        let stiff = self.vector(&self.solver.product(&self.system, &self.field(vector)));
+        let without = self.force_derivative(vector);
+        stiff.iter().zip(without).map(|(k, w)| k - w).collect()
+    }
+
+    /// (K - W)^-1, with the springs of a leaf that can turn, times these columns, by the factors of the dense matrix;
+    /// `None` if it is singular.
+    fn solve_dense(&self, columns: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
+        let size = self.solver.size();
+        let of_unit = |at: usize| {
+            let unit = self.unit(at);
+            let springs = self.vector(&self.system.mass_product(&self.field(&unit)));
+            let stiffness = self.stiffness(&unit).into_iter().zip(springs);
+            stiffness.map(|(k, mass)| k + self.neutral * mass).collect()
+        };
+        let of_units: Vec<Vec<f64>> = (0..size).map(of_unit).collect();
+        let matrix = Mat::from_fn(size, size, |r, c| of_units[c][r]);
+        let wanted = Mat::from_fn(size, columns.len(), |r, c| columns[c][r]);
+        let solved = matrix.partial_piv_lu().solve(&wanted);
+        let left = &matrix * &solved - &wanted;
+        let accurate = left.norm_l2() <= LARGEST_INVERSE_RESIDUAL * wanted.norm_l2();
+        let column = |c: usize| (0..size).map(|r| solved[(r, c)]).collect();
+        accurate.then(|| (0..columns.len()).map(column).collect())
     }
 
     /// Whether there is damping that is not proportional to the masses.
@@ -373,6 +437,15 @@ impl<'a> LinearizedMotion<'a> {
         let node = |j: usize, i: usize| self.solver.unknowns(j, i).map(|at| vector[at]);
         let rod = |j: usize| self.leaf.moving_nodes().map(|i| node(j, i)).collect();
         (0..self.leaf.rods()).map(rod).collect()
+    }
+
+    /// A vector as increments of all nodes, rod after rod, base to tip.
+    pub(super) fn node_increments(&self, vector: &[c64]) -> Vec<ComplexIncrement> {
+        let mut shape = vec![[c64::new(0.0, 0.0); 6]; self.state.x.len()];
+        for (j, i) in self.leaf.rod_index_pairs(self.leaf.moving_nodes()) {
+            shape[self.state.base(j) + i] = self.solver.unknowns(j, i).map(|at| vector[at]);
+        }
+        shape
     }
 
     /// Forces on the nodes as a vector.
@@ -552,11 +625,7 @@ impl<'a> LinearizedMotion<'a> {
         };
         let masses = complex(&|v| self.masses.times(v));
         let damping = complex(&|v| self.damping(v));
-        let stiffness = complex(&|v| {
-            let stiff = self.vector(&self.solver.product(&self.system, &self.field(v)));
-            let without = self.force_derivative(v);
-            stiff.iter().zip(without).map(|(k, w)| k - w).collect()
-        });
+        let stiffness = complex(&|v| self.stiffness(v));
         let all = masses.iter().zip(&damping).zip(&stiffness);
         let value = |((m, c), k): ((&c64, &c64), &c64)| lambda * (lambda * m + c) + k;
         let slope = |(m, c): (&c64, &c64)| 2.0 * lambda * m + c;

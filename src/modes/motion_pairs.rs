@@ -7,7 +7,7 @@
 //! without damping: there roots have no derivatives.
 
 use crate::leaf::{DiscreteLeaf, MatrixFactors, State};
-use crate::modes::linearized::LinearizedMotion;
+use crate::modes::linearized::{ComplexIncrement, LinearizedMotion, MotionRoot};
 use crate::motion::Physics;
 use crate::newton::FollowerForces;
 use crate::run::Limit;
@@ -28,6 +28,54 @@ pub struct MotionPair {
     /// The denominator of the derivative, as a part of that with either vector alone: one without damping and with a
     /// potential, and zero where two roots merge.
     pub separation: f64,
+}
+
+/// Imaginary part of the square of a root, as a part of it, that is rounding of two equal real ones.
+const EQUAL_SQUARES: f64 = 1e-6;
+
+/// A small motion exp(lambda t) x: lambda, and x at all nodes, rod after rod, base to tip.
+#[derive(Clone, Debug)]
+pub struct NodalMotion {
+    pub root: MotionRoot,
+    pub shape: Vec<ComplexIncrement>,
+}
+
+/// The small motions about a state next to zero with their shapes, one of each conjugate pair, in the order of
+/// [`lowest_roots`](crate::modes::linearized::lowest_roots). `None` where that has none.
+pub fn lowest_shapes(
+    leaf: &DiscreteLeaf,
+    physics: &Physics,
+    state: &State,
+    forces: &dyn FollowerForces,
+    count: usize,
+    time: &Limit,
+) -> Option<Vec<NodalMotion>> {
+    let shift = leaf.neutral_shift();
+    let (motion, mut factors) = LinearizedMotion::new(leaf, physics, state, forces, shift)?;
+    let found = shapes(&motion, &mut factors, count, time)?;
+    let squares = !motion.is_damped_beside_masses();
+    let nodal = |root: c64, vector: &[c64]| NodalMotion {
+        root: MotionRoot::new(root),
+        shape: motion.node_increments(vector),
+    };
+    let mut all = Vec::new();
+    for Shape { root, vector } in &found {
+        let square = motion.square_of_root(*root);
+        if squares && square.im != 0.0 && square.im.abs() <= EQUAL_SQUARES * square.norm() {
+            // Both parts of the vector are shapes of two equal real squares: made orthogonal.
+            let main = (0.5 * dot(vector, vector).arg()).sin_cos();
+            let turn = c64::new(main.1, -main.0);
+            let turned = || vector.iter().map(|it| *it * turn);
+            let parts = [
+                turned().map(|it| c64::new(it.re, 0.0)).collect::<Vec<_>>(),
+                turned().map(|it| c64::new(it.im, 0.0)).collect(),
+            ];
+            all.extend(parts.map(|part| nodal(*root, &part)));
+        } else {
+            all.push(nodal(*root, vector));
+        }
+    }
+    Some(all)
 }
 
 /// The small motions about a state next to zero, one of each conjugate pair, as

@@ -125,17 +125,19 @@ fn softened(GridLevel { leaf, state }: &GridLevel, times: f64) -> DiscreteLeaf {
     soft
 }
 
-/// The small motions that grow about a balance on a grid, of matrices that are softened so many times;
-/// `None` if its roots are not found.
+/// The small motions that grow about a balance on a grid, of matrices that are softened so many times, among so many
+/// roots next to zero; `None` if these are not found.
 pub(crate) fn growing_motions(
     level: &GridLevel,
     softening: f64,
+    searched_roots: usize,
     limit: &Limit,
 ) -> Option<GrowingMotions> {
     let (physics, _) = Physics::for_small_motions(&level.leaf.leaf);
     let leaf = softened(level, softening);
     let forces = WithoutPotential::in_motion(&leaf, &physics);
-    let roots = lowest_roots(&leaf, &physics, &level.state, &forces, LEAST_ROOTS, limit)?;
+    let count = LEAST_ROOTS.max(searched_roots);
+    let roots = lowest_roots(&leaf, &physics, &level.state, &forces, count, limit)?;
     let rate = 1.0 / physics.time_unit;
     let mut growing = GrowingMotions::default();
     match roots {

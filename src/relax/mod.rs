@@ -14,7 +14,8 @@ mod follow;
 mod linear_response;
 mod loading;
 mod log;
-pub(crate) mod nested_grids;
+pub(crate) mod motion_shapes;
+mod nested_grids;
 mod path;
 pub(crate) mod plan;
 mod remark;
@@ -25,7 +26,7 @@ mod saddle;
 mod same_equilibrium;
 mod sensitivity;
 mod shooting;
-mod small_motions;
+pub(crate) mod small_motions;
 pub(crate) mod solve_on_grid;
 pub(crate) mod stability;
 
@@ -39,6 +40,7 @@ pub(crate) use crate::relax::follow::{ContinuationFailure, GridPolicy};
 pub use crate::relax::follow::{EquilibriumTracker, TrackOutcome};
 pub(crate) use crate::relax::linear_response::Linearized;
 pub use crate::relax::log::{Attempt, AttemptEnd, Extent, Strategy};
+pub use crate::relax::motion_shapes::MotionShape;
 pub use crate::relax::path::{Event, Path, PathPosition, Route, StabilityLoss, Stage};
 pub(crate) use crate::relax::remark::serialize_remark;
 pub use crate::relax::remark::{

@@ -13,10 +13,12 @@ use crate::relax::path::Path;
 use crate::relax::plan::{GRIDS, RelaxationProblem, WORK};
 use crate::relax::saddle::INDEFINITE_NEWTON_EQUATIONS;
 use crate::relax::same_equilibrium::{is_near_guess, is_own_mirror_image, is_same_on_two_grids};
+use crate::relax::solve_on_grid::follower_loads::balance_on_next_grid;
 use crate::relax::solve_on_grid::{
     COARSEST_TURN, GridGuess, GridSolution, InitialGuess, StabilityCheck, check_stability,
     find_grid_equilibrium, finest_resolving, has_coarse_span,
 };
+use crate::run::Limit;
 
 /// Newton iterations to the same equilibrium, of any index, on the next grid.
 pub(super) const NEXT_GRID_ITERATIONS: usize = 12;
@@ -203,6 +205,18 @@ pub(super) fn solve_from_guess(
     match rest {
         Ok(_) => Ok(found),
         Err(stop) => found.into_failure(stop),
+    }
+}
+
+impl NestedEquilibrium {
+    /// The equilibrium continued to the next finer grid; `None` if there is none, or Newton's method leads elsewhere.
+    pub(crate) fn level_on_next_grid(&self, limit: &Limit) -> Option<GridLevel> {
+        self.next_finer_grid()?;
+        let (finest, others) = self.levels.split_last()?;
+        match finest.leaf.leaf.has_potential() {
+            true => on_next_grid(others.last(), finest, self.requested_tolerance()),
+            false => balance_on_next_grid(finest, limit),
+        }
     }
 }
 

@@ -82,6 +82,10 @@ pub struct Event {
 pub enum StabilityLoss {
     /// The equilibrium ended at a fold: the leaf moved to another one.
     Snapped,
+    /// Nothing was lost, but within a short part of the path the leaf moved far: a nearly perfect one, where a perfect
+    /// one would turn to either side.
+    #[serde(rename = "bent-sharply")]
+    BentSharply,
     /// The equilibrium became unstable: the leaf turned aside.
     Branched {
         /// Whether to turn to the other side was as good: a mirror image.
@@ -129,9 +133,10 @@ impl Path {
     /// The word for the path in files.
     pub fn word(&self) -> &'static str {
         let snapped = |event: &Event| event.happening == StabilityLoss::Snapped;
+        let bent = |event: &Event| event.happening == StabilityLoss::BentSharply;
         match self.events() {
             _ if *self == Path::Released => "released",
-            [] => "stable-throughout",
+            events if events.iter().all(bent) => "stable-throughout",
             events if events.iter().any(snapped) => "snapped",
             _ => "branched",
         }
@@ -143,6 +148,9 @@ impl fmt::Display for Event {
         let percent = 100.0 * self.part;
         let what = match self.happening {
             StabilityLoss::Snapped => "snapped",
+            StabilityLoss::BentSharply => {
+                "bent sharply, where a perfect leaf would turn to either side,"
+            }
             StabilityLoss::Branched {
                 equally_open: true, ..
             } => "turned to one of two equal sides",

@@ -479,15 +479,6 @@ pub fn check_options_without_potential(
         Method::Explicit { .. } => Some("explicit relaxation"),
         _ => None,
     };
-    let listed = matches!(options.method, Method::SemiImplicit(_)) && options.mode_shapes;
-    let without_modes = match scenario.wind {
-        _ if followers => Some("load.follower, load.couple, load.point.follows"),
-        Some(_) => Some("[wind]"),
-        None => None,
-    };
-    if let Some(key) = without_modes.filter(|_| listed && general.is_none()) {
-        return Err(UnmodelledFeature::Modes { key }.into());
-    }
     if let Some(what) = general.filter(|_| followers) {
         return Err(UnmodelledFeature::Followers { what }.into());
     }

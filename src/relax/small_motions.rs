@@ -5,11 +5,12 @@ use crate::leaf::DiscreteLeaf;
 use crate::modes::linearized::{
     MOST_DENSE_STATES, MotionRoot, MotionRoots, Square, all_roots, lowest_roots, states_per_node,
 };
-use crate::modes::motion_pairs::{MotionPair, lowest_pairs};
+use crate::modes::motion_pairs::{MotionPair, lowest_pairs, lowest_shapes};
 use crate::motion::{AssumedMotion, Physics};
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
+use crate::relax::motion_shapes::{MotionShape, shapes_of_roots};
 use crate::relax::plan::{RelaxationProblem, UNKNOWNS};
 use crate::relax::solve_on_grid::follower_loads::{
     WithoutPotential, balance_on_coarse_grid, balance_on_next_grid,
@@ -38,12 +39,15 @@ pub const LEAST_ROOTS: usize = 8;
 struct GrowthSurvey {
     /// Segments of the coarsest and of the finest grid on which all roots are computed.
     segments: [usize; 2],
+    /// Segments of the next grid, as a part of those of one on which the leaf is not balanced, or whose dense matrix is
+    /// too large or singular.
+    coarser: f64,
     /// Growth, as a part of the size of a root, that counts.
     growth: f64,
     /// Growth besides that rounding makes of two equal frequencies: of a root as small as the smallest, of others times
     /// the square of their ratio.
     rounding: f64,
-    /// Roots beyond the first one that grows, which may have another place on finer grids.
+    /// Roots beyond the last one that grows, which may have another place on finer grids.
     further: usize,
     /// Largest number of roots that are then computed on all grids.
     most_roots: usize,
@@ -51,6 +55,7 @@ struct GrowthSurvey {
 
 const SURVEY: GrowthSurvey = GrowthSurvey {
     segments: [4, 16],
+    coarser: 0.75,
     growth: 1e-3,
     rounding: 1e-9,
     further: 4,
@@ -82,8 +87,13 @@ pub struct SmallMotions {
     /// Whether growing motions were looked for among all of a coarse grid. Otherwise only the slowest are known; of a
     /// leaf too large for such a grid `stable` is `None` if none of these grows.
     pub complete: bool,
+    /// So many of the roots next to zero were computed on each grid, among which is the first that grows on a coarse
+    /// one.
+    pub searched_roots: usize,
     /// What is assumed of masses and damping.
     pub assumed: AssumedMotion,
+    /// The shapes of the motions of `growth_rates`, on the finest grid, if they were requested and found.
+    pub shapes: Option<Vec<MotionShape>>,
 }
 
 /// Growth and frequency of a small motion, in the scenario's unit of time.
@@ -112,7 +122,7 @@ const ROOT_ACCURACY: f64 = 2e-7;
 
 /// The bound on the error of a root that is told.
 fn told_error(it: &ExtrapolatedRoot) -> Option<f64> {
-    Some(ROOT_SAFETY * it.error? + ROOT_ACCURACY * it.root.size())
+    Some(ROOT_SAFETY * it.error? + ROOT_ACCURACY * it.root.size() + it.softening)
 }
 
 /// Unknowns of a leaf on a grid.
@@ -143,6 +153,13 @@ impl RootSeries {
         self.damped.drain(..excess(self.damped.len()));
     }
 
+    /// So many motions on the finest grid have those of the series among them: of squares there are two for each that is
+    /// asked for.
+    fn shapes_to_compute(&self) -> usize {
+        let squares = self.squares.last().map_or(0, |it| it.1.len().div_ceil(2));
+        squares.max(self.damped.last().map_or(0, |it| it.1.len()))
+    }
+
     fn extrapolated(&self) -> Option<Vec<ExtrapolatedRoot>> {
         match self.squares.is_empty() {
             true => extrapolate_damped(&self.damped),
@@ -150,9 +167,9 @@ impl RootSeries {
         }
     }
 
-    /// Whether there are grids enough for these roots: the lowest are accurate, and it is certain of all
+    /// Whether there are grids enough for these roots: so many of the lowest are accurate, and it is certain of all
     /// whether they grow.
-    fn suffices(&self, roots: &[ExtrapolatedRoot]) -> bool {
+    fn suffices(&self, roots: &[ExtrapolatedRoot], lowest: usize) -> bool {
         let squares = self.squares.iter().map(|it| it.0);
         let segments: Vec<usize> = squares.chain(self.damped.iter().map(|it| it.0)).collect();
         let accurate = |it: &ExtrapolatedRoot| {
@@ -163,13 +180,16 @@ impl RootSeries {
             && segments
                 .last()
                 .is_some_and(|finest| *finest >= LEAST_SEGMENTS)
-            && roots.iter().take(LEAST_ROOTS / 2).all(accurate)
+            && roots.iter().take(lowest).all(accurate)
             && roots.iter().all(|it| it.grows.is_some())
     }
 }
 
 /// Imaginary part of the square of a difference, as a part of it, that is rounding.
 const COMPLEX_ROUNDING: f64 = 1e-6;
+
+/// Difference of two squares, as a part of their mean, that is rounding of equal ones, as of a round rod.
+const EQUAL_SQUARES: f64 = 1e-6;
 
 /// Cosine of the angle between the modes of two real squares from which on they are about to meet.
 const MEETING_ALIGNMENT: f64 = 0.98;
@@ -178,7 +198,11 @@ const MEETING_ALIGNMENT: f64 = 0.98;
 #[derive(Clone, Copy)]
 struct ExtrapolatedRoot {
     root: MotionRoot,
+    /// The root on the finest grid.
+    on_finest: MotionRoot,
     error: Option<f64>,
+    /// What the compliance of the matrices of nearly rigid segments changes.
+    softening: f64,
     /// Whether it grows, if that is certain.
     grows: Option<bool>,
 }
@@ -227,7 +251,16 @@ pub fn small_motions(
         GrowthReach::Within(count) if count <= SURVEY.most_roots => count.max(usual),
         _ => usual,
     };
+    // Roots on which the verdict depends: more that are requested may not converge.
+    let needed = match reach {
+        GrowthReach::Within(count) if count <= SURVEY.most_roots => count.max(LEAST_ROOTS),
+        _ => LEAST_ROOTS,
+    };
     let found_all = Cell::new(true);
+    let asked = match problem.options.mode_shapes {
+        true => problem.options.modes,
+        false => 0,
+    };
     let on = |level: &GridLevel| {
         if unknowns(&level.leaf) > UNKNOWNS.without_shapes {
             return None;
@@ -236,16 +269,27 @@ pub fn small_motions(
         let limit = &problem.options.limit;
         let lowest =
             |count| lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit);
-        lowest(wanted).or_else(|| {
-            found_all.set(wanted == usual);
-            if wanted > usual { lowest(usual) } else { None }
-        })
+        let mut count = wanted;
+        loop {
+            match lowest(count) {
+                None if count > needed => count = (count / 2).max(needed),
+                None if needed > LEAST_ROOTS => {
+                    found_all.set(false);
+                    return lowest(LEAST_ROOTS);
+                }
+                found => return found,
+            }
+        }
     };
     let skipped = found.levels.len().saturating_sub(EXTRAPOLATED_GRIDS);
     let mut series = RootSeries::default();
+    let mut finest_of_series = None;
     for level in found.levels.iter().skip(skipped) {
         match on(level) {
-            Some(roots) => series.push(level.leaf.segments(), roots),
+            Some(roots) => {
+                series.push(level.leaf.segments(), roots);
+                finest_of_series = Some(Cow::Borrowed(level));
+            }
             // The series needs consecutive grids.
             None if series.is_empty() => {}
             None => break,
@@ -254,7 +298,7 @@ pub fn small_motions(
     let mut roots = series.extrapolated()?;
     let mut finest = Cow::Borrowed(found.levels.last()?);
     let fixed = problem.segments().is_some();
-    while !fixed && !series.suffices(&roots) && !problem.out_of_time() {
+    while !fixed && !series.suffices(&roots, asked.max(LEAST_ROOTS / 2)) && !problem.out_of_time() {
         if 2 * unknowns(&finest.leaf) > UNKNOWNS.quick {
             break;
         }
@@ -267,6 +311,11 @@ pub fn small_motions(
         series.push(next.leaf.segments(), further);
         roots = series.extrapolated()?;
         finest = Cow::Owned(next);
+        finest_of_series = Some(finest.clone());
+    }
+    let softening = SofteningShifts::new(problem, found, &physics, wanted);
+    for root in &mut roots {
+        root.softening = softening.as_ref().map_or(0.0, |it| it.of_root(root.root));
     }
     let grow: Vec<Option<bool>> = roots.iter().map(|it| it.grows).collect();
     let (certain, complete) = match reach {
@@ -291,6 +340,18 @@ pub fn small_motions(
         .filter(|(k, (_, grows))| *k < problem.options.modes || **grows == Some(true))
         .map(|(_, (root, _))| *root)
         .collect();
+    let shapes = || {
+        let level = finest_of_series.as_deref()?;
+        let forces = WithoutPotential::in_motion(&level.leaf, &physics);
+        let limit = &problem.options.limit;
+        let lowest =
+            |count| lowest_shapes(&level.leaf, &physics, &level.state, &forces, count, limit);
+        let motions = lowest(series.shapes_to_compute())?;
+        let on_finest: Vec<MotionRoot> = listed.iter().map(|it| it.on_finest).collect();
+        let curves = &found.levels.last()?.leaf;
+        shapes_of_roots(&on_finest, &motions, &level.leaf, curves)
+    };
+    let shapes = (asked > 0).then(shapes).flatten();
     let rate = 1.0 / physics.time_unit;
     let conjugate = |it: &ExtrapolatedRoot| match (it.grows, it.root.frequency > 0.0) {
         (Some(true), true) => Some(2),
@@ -320,7 +381,9 @@ pub fn small_motions(
         stable,
         instability,
         complete,
+        searched_roots: if found_all.get() { needed } else { LEAST_ROOTS },
         assumed,
+        shapes,
     })
 }
 
@@ -338,50 +401,106 @@ pub(crate) fn small_motion_pairs(level: &GridLevel, count: usize) -> Option<Vec<
 enum GrowthReach {
     /// So many, by all roots of a coarse grid; none if none grows.
     Within(usize),
-    /// The leaf is not balanced on a coarse grid, or its dense matrix is singular: the slowest motions decide.
+    /// The leaf is balanced on no coarse grid, or the dense matrix is singular on all of them: the slowest motions
+    /// decide.
     NotComputed,
     /// The leaf has too many unknowns on any grid.
     TooLarge,
 }
 
-/// Where among all roots on a coarse grid the first is that grows.
+/// Where among all roots on a coarse grid those are that grow: the last that can be reached or, if none can, the first.
 fn growth_reach(
     problem: &RelaxationProblem,
     found: &NestedEquilibrium,
     physics: &Physics,
 ) -> GrowthReach {
-    let Some(first) = found.levels.first() else {
+    let (Some(first), Some(finest)) = (found.levels.first(), found.levels.last()) else {
         return GrowthReach::NotComputed;
     };
     let [least, most] = SURVEY.segments;
     let states = states_per_node(&first.leaf, physics) * first.leaf.rods();
-    let segments = most.min(MOST_DENSE_STATES / states);
-    let level = match first.leaf.segments() <= segments {
-        true => Some(Cow::Borrowed(first)),
-        false if segments < least => return GrowthReach::TooLarge,
-        false => balance_on_coarse_grid(first, segments, &problem.options.limit).map(Cow::Owned),
-    };
-    let roots = level.and_then(|level| {
+    let mut segments = most.min(MOST_DENSE_STATES / states);
+    let roots_on = |level: &GridLevel| {
         let forces = WithoutPotential::in_motion(&level.leaf, physics);
         all_roots(&level.leaf, physics, &level.state, &forces)
+    };
+    let fixed = problem.segments().is_some() && first.leaf.segments() <= segments;
+    if segments < least && !fixed {
+        return GrowthReach::TooLarge;
+    }
+    // On coarser grids flutter begins under larger loads.
+    let own = found.levels.iter().rev().find(|it| {
+        let own = it.leaf.segments();
+        own <= segments && (fixed || own as f64 >= SURVEY.coarser * segments as f64)
     });
+    let mut roots = own.and_then(roots_on);
+    // Kinks and hinges add nodes to those that are allowed for, and a leaf need not balance on every grid.
+    while roots.is_none() && segments >= least && !problem.out_of_time() {
+        let level = balance_on_coarse_grid(finest, segments, &problem.options.limit);
+        roots = level.as_ref().and_then(roots_on);
+        segments = (SURVEY.coarser * segments as f64) as usize;
+    }
     let Some(roots) = roots else {
         return GrowthReach::NotComputed;
     };
-    let roots: Vec<MotionRoot> = match roots {
-        MotionRoots::Squares(squares) => {
-            let roots = squares.iter().map(|it| MotionRoot::from_square(it.value));
-            roots.collect()
-        }
-        MotionRoots::Damped(roots) => roots,
-    };
+    let roots = roots.into_roots();
     let smallest = roots.first().map_or(0.0, |it| it.size());
     let grows = |it: &MotionRoot| {
         let rounding = SURVEY.rounding * (it.size() / smallest).powi(2);
         it.growth > (SURVEY.growth + rounding) * it.size()
     };
-    let first = roots.iter().position(grows);
-    GrowthReach::Within(first.map_or(0, |first| first + 1 + SURVEY.further))
+    let growing = roots.iter().enumerate().filter(|(_, it)| grows(it));
+    let reaches: Vec<usize> = growing.map(|(k, _)| k + 1 + SURVEY.further).collect();
+    let within = reaches.iter().rfind(|reach| **reach <= SURVEY.most_roots);
+    GrowthReach::Within(within.or(reaches.first()).copied().unwrap_or(0))
+}
+
+/// How the roots on the coarsest grid change with the compliance by which the matrices of nearly rigid segments are
+/// softened: by as much as they are changed by it.
+struct SofteningShifts(Vec<(MotionRoot, f64)>);
+
+/// Compliance that is added to a matrix, as a part of the sum, that is rounding.
+const LEAST_SOFTENING: f64 = 1e-6;
+
+impl SofteningShifts {
+    /// `None` of a leaf without such segments, or if roots are not found.
+    fn new(
+        problem: &RelaxationProblem,
+        found: &NestedEquilibrium,
+        physics: &Physics,
+        count: usize,
+    ) -> Option<Self> {
+        let GridLevel { leaf, state } = found.levels.first()?;
+        let mut softer = leaf.clone();
+        let mut softened = false;
+        for section in &mut softer.sections {
+            let (own, all) = (section.compliance, section.condensing.recip());
+            let added = all - own;
+            softened |= added.cmpgt(LEAST_SOFTENING * all).any();
+            section.condensing = (all + added).recip();
+        }
+        if !softened || unknowns(leaf) > UNKNOWNS.without_shapes {
+            return None;
+        }
+        let limit = &problem.options.limit;
+        let roots = |leaf: &DiscreteLeaf| {
+            let forces = WithoutPotential::in_motion(leaf, physics);
+            lowest_roots(leaf, physics, state, &forces, count, limit).map(MotionRoots::into_roots)
+        };
+        let both = roots(leaf)?.into_iter().zip(roots(&softer)?);
+        let shift = |(own, soft): (MotionRoot, MotionRoot)| (own, own.distance(soft));
+        Some(SofteningShifts(both.map(shift).collect()))
+    }
+
+    /// The change of a root: that of the root next to it on the coarsest grid.
+    fn of_root(&self, root: MotionRoot) -> f64 {
+        let distance = |it: &&(MotionRoot, f64)| it.0.distance(root);
+        let nearest = self
+            .0
+            .iter()
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        nearest.map_or(0.0, |it| it.1)
+    }
 }
 
 /// Roots with damping, of which real and imaginary part are extrapolated. They pass zero growth without
@@ -404,7 +523,9 @@ fn extrapolate_damped(grids: &[(usize, Vec<MotionRoot>)]) -> Option<Vec<Extrapol
                 growth: growth.value,
                 frequency: frequency.value,
             },
+            on_finest: *own,
             error: growth.error.zip(frequency.error).map(|(a, b)| a.max(b)),
+            softening: 0.0,
             grows: match rounding {
                 true => Some(false),
                 false => growth.is_positive(),
@@ -434,25 +555,38 @@ fn extrapolate_squares(grids: &[(usize, Vec<Square>)]) -> Option<Vec<Extrapolate
         });
         let meets = finest[k].value.im != 0.0 || finest[k].alignment > MEETING_ALIGNMENT;
         if let Some((mean, it)) = mean.zip(difference).filter(|_| meets) {
+            // Two equal real ones, but for rounding.
+            let equal = it.value.abs().sqrt() <= EQUAL_SQUARES * mean.value.abs();
             let half = it.value.abs().sqrt();
             let error = mean.error.zip(it.error);
-            let error = error.map(|(mean, square)| mean + square / (2.0 * half));
+            let error = error.map(|(mean, square)| match equal {
+                true => mean + square.sqrt(),
+                false => mean + square / (2.0 * half),
+            });
             // Real ones may be zero, or positive.
-            let certain = it.is_positive();
-            let squares = match it.value < 0.0 {
+            let certain = if equal { Some(true) } else { it.is_positive() };
+            let squares = match it.value < 0.0 && !equal {
                 true => vec![c64::new(mean.value, half)],
                 false => [-half, half]
                     .map(|by| c64::new(mean.value + by, 0.0))
                     .into(),
             };
-            roots.extend(squares.into_iter().map(|square| {
-                let root = MotionRoot::from_square(square);
-                ExtrapolatedRoot {
-                    root,
-                    error: error.map(|error| error / (2.0 * root.size())),
-                    grows: certain.map(|_| square.im != 0.0 || square.re > 0.0),
-                }
-            }));
+            let on_finest = [k, k + 1].map(|k| on_upper_half(finest[k].value));
+            roots.extend(
+                squares
+                    .into_iter()
+                    .zip(on_finest)
+                    .map(|(square, on_finest)| {
+                        let root = MotionRoot::from_square(square);
+                        ExtrapolatedRoot {
+                            root,
+                            on_finest,
+                            error: error.map(|error| error / (2.0 * root.size())),
+                            softening: 0.0,
+                            grows: certain.map(|_| square.im != 0.0 || square.re > 0.0),
+                        }
+                    }),
+            );
             k += 2;
             continue;
         }
@@ -468,7 +602,9 @@ fn extrapolate_squares(grids: &[(usize, Vec<Square>)]) -> Option<Vec<Extrapolate
         let root = MotionRoot::from_square(c64::new(real.value, 0.0));
         roots.push(ExtrapolatedRoot {
             root,
+            on_finest: on_upper_half(finest[k].value),
             error: real.error.map(|error| error / (2.0 * root.size())),
+            softening: 0.0,
             grows: match same {
                 true => Some(real.value > 0.0),
                 false => real.is_positive(),
@@ -477,6 +613,11 @@ fn extrapolate_squares(grids: &[(usize, Vec<Square>)]) -> Option<Vec<Extrapolate
         k += 1;
     }
     Some(roots)
+}
+
+/// The root of a square, of conjugate ones the same.
+fn on_upper_half(square: c64) -> MotionRoot {
+    MotionRoot::from_square(c64::new(square.re, square.im.abs()))
 }
 
 impl SmallMotions {

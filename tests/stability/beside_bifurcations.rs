@@ -5,8 +5,8 @@
 use leafdyn::internals::branch::{BranchEquations, LeafFamily};
 use leafdyn::internals::leaf::{DiscreteLeaf, Grid};
 use leafdyn::internals::relax::{initial_state, relax_from_state};
-use leafdyn::relax::EquilibriumDoubt;
-use leafdyn_testing::branch::{text, weightless};
+use leafdyn::relax::{EquilibriumDoubt, Event, StabilityLoss};
+use leafdyn_testing::branch::{self, text, weightless};
 use leafdyn_testing::*;
 
 /// Euler's load of the clamped-free column, EI = L = 1.
@@ -337,4 +337,48 @@ fn the_index_does_not_depend_on_how_many_modes_are_requested() {
         assert_eq!(index, Some(if straight { 2 } else { 0 }), "{modes} modes");
         assert!(leaf.outcome != Outcome::Converged, "{modes} modes");
     }
+}
+
+/// A column beyond the weight under which a perfect one buckles, 7.84, and a little out of plumb.
+fn leaning_column(push: f64) -> String {
+    format!(
+        r#"
+        name = "column"
+        leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+        stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.3, axial = inf, shear_2 = inf, shear_3 = inf }}
+        load = {{ gravity = [-9.0, 0.0, {push:?}] }}
+        "#
+    )
+}
+
+/// Slow loading bends a nearly perfect column sharply, and to the side to which it leans: no stability is lost, and so
+/// says the trace, which ends in the same shape. A perfect one turns to either side.
+#[test]
+fn a_column_out_of_plumb_bends_to_its_side() {
+    for push in [4e-6, -4e-6, 4e-4, -2e-2] {
+        let leaf = settle(&parse(&leaning_column(push)), 1e-7);
+        let path = leaf.path.as_ref().unwrap();
+        assert_eq!(path.word(), "stable-throughout", "{push}: {path:?}");
+        let sharp = |event: &Event| event.happening == StabilityLoss::BentSharply;
+        assert!(path.events().iter().all(sharp), "{push}");
+        if push.abs() < 1e-3 {
+            let part = path.events()[0].part;
+            assert!((part - 7.8373 / 9.0).abs() < 0.05, "{push}: {part}");
+        }
+        let tip = leaf.tips[0];
+        assert!(tip.z * push > 0.0 && tip.z.abs() > 0.5, "{push}: {tip}");
+        let base = base(&leaning_column(push), "");
+        let mut request = branch::request(base, "load.gravity[0]=-1..-9", 1e-7, 400);
+        request.keep_unstable = false;
+        let trace = leafdyn::study::trace(&request, &mut |_, _, _| {}).unwrap();
+        let followed = &trace.branches[0];
+        assert!(
+            trace.complete && followed.critical_points().next().is_none(),
+            "{push}"
+        );
+        let apart = followed.points.last().unwrap().tips[0].distance(tip);
+        assert!(apart < 1e-5, "{push}: {apart:e}");
+    }
+    let perfect = settle(&parse(&leaning_column(0.0)), 1e-7);
+    assert_eq!(perfect.path.unwrap().word(), "branched");
 }

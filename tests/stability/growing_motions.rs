@@ -1,6 +1,7 @@
 //! Motions that grow are found also where many others are slower.
 
 use leafdyn::relax::MotionInstability;
+use leafdyn::study::{PointKind, trace};
 use leafdyn_testing::*;
 
 /// Round veins side by side without anything between them, of which the last is stiff.
@@ -58,6 +59,59 @@ fn one_stiff_vein_of_many_flutters() {
             "{growth} {frequency} {rates:?} {frequencies:?}"
         );
     }
+}
+
+/// The load at which a stiff vein flutters (Beck, ZAMP 3, 1952) is located along a trace beside soft veins, of which more
+/// than twenty motions are slower.
+#[test]
+fn flutter_of_one_stiff_vein_of_many_is_located() {
+    let text = r#"
+        name = "veins"
+        leaf = { rods = 4, length = 1.0, fan = [0.0, 0.1, 0.2, 0.3], joined = false }
+        dynamics = { density = 1.0, external_damping = 0.0 }
+        [stiffness]
+        torsion = [1.0, 1.0, 1.0, 500.0]
+        bending_2 = [1.0, 1.1, 1.2, 900.0]
+        bending_3 = [1.3, 1.4, 1.5, 200.0]
+        axial = inf
+        shear_2 = inf
+        shear_3 = inf
+        [[load.point]]
+        vein = 4
+        at = 1.0
+        force = [-3500.0, 0.0, 0.0]
+        follows = true
+    "#;
+    let vary = "load.point[0].force[0]=-3500..-4500";
+    let mut request = branch::request(base(text, ""), vary, 1e-6, 200);
+    request.keep_unstable = false;
+    let trace = trace(&request, &mut |_, _, _| {}).unwrap();
+    assert!(
+        trace.complete,
+        "{:?} {:?}",
+        trace.remark,
+        trace.branches[0].remark()
+    );
+    let events: Vec<_> = trace.branches[0].critical_points().collect();
+    assert_eq!(events.len(), 1);
+    let (_, flutter) = events[0];
+    assert_eq!(flutter.kind, PointKind::Flutter);
+    let (apart, error) = (
+        flutter.value + 200.0 * 20.050_953_6,
+        flutter.value_error.unwrap(),
+    );
+    assert!(
+        apart.abs() <= error && error < 0.1,
+        "{} {error}",
+        flutter.value
+    );
+    let motion = flutter.motion.as_ref().unwrap().dominant.as_ref().unwrap();
+    close(
+        "frequency",
+        motion.frequency,
+        11.015_56 * 200.0_f64.sqrt(),
+        1e-4,
+    );
 }
 
 /// Of a leaf with more veins in wind than have a coarse grid it is not known.

@@ -17,6 +17,7 @@ mod margin_of_grips;
 mod margin_random;
 mod mode_shapes;
 mod modes;
+mod motion_shapes;
 mod off_axis;
 mod point_masses;
 mod rollers;

@@ -91,7 +91,7 @@ function widen() {
 }
 
 function draw(again) {
-  const leaf = shown.mode >= 0 && view.modes.length ? inMode(view.modes[shown.mode], shown.swing * Math.sin(shown.phase)) : current;
+  const leaf = shown.mode >= 0 && view.modes.length ? inMode(view.modes[shown.mode], shown.phase, shown.swing) : current;
   leaves = [leaf];
   if (!space) return;
   if (!shown.plain) widen();

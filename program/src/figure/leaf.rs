@@ -23,7 +23,7 @@ use crate::report::numbers::{
 };
 use crate::report::{relaxation_verdict, shooting_method_name, stability_phrase};
 use glam::{DVec2, DVec3};
-use leafdyn::relax::{Equilibrium, Mode};
+use leafdyn::relax::{Equilibrium, Mode, SmallMotions};
 use leafdyn::scenario::units::{ENERGY, RATE};
 use leafdyn::scenario::{Scenario, Units};
 use leafdyn::study::Equilibria;
@@ -299,21 +299,78 @@ const MOST_MODES_DRAWN: usize = 12;
 /// Largest displacement drawn, as a fraction of the leaf's extent.
 const LARGEST_DRAWN_AMPLITUDE: f64 = 0.2;
 
+/// Largest displacement a quarter of a period later, as a part of the largest, that is not drawn.
+const IN_PHASE: f64 = 1e-3;
+
+/// A mode of vibration, or a small motion of a leaf without a potential.
+pub struct DrawnMode<'a> {
+    /// Its frequency and growth.
+    pub text: String,
+    grows: bool,
+    pub displacement: &'a [Vec<DVec3>],
+    /// Displacement a quarter of a period later, where nodes move out of phase.
+    pub later_displacement: Option<&'a [Vec<DVec3>]>,
+}
+
+impl DrawnMode<'_> {
+    /// The lowest modes or small motions of a leaf, as far as their shapes are known.
+    pub fn lowest<'a>(equilibrium: &'a Equilibrium, units: &Units) -> Vec<DrawnMode<'a>> {
+        let modes = equilibrium.stability.modes.iter().flatten();
+        let modes = modes.map(|mode| DrawnMode {
+            text: mode_text(mode, units),
+            grows: mode.growth().is_some() && !mode.is_neutral(),
+            displacement: &mode.displacement,
+            later_displacement: None,
+        });
+        let motions = equilibrium.stability.small_motions.iter();
+        let shapes = motions.flat_map(|motions| {
+            let shapes = motions.shapes.iter().flatten().enumerate();
+            shapes.map(move |(k, shape)| {
+                let later = largest_length(&shape.later_displacement);
+                let in_phase = later <= IN_PHASE * largest_length(&shape.displacement);
+                DrawnMode {
+                    text: small_motion_text(motions, k, units),
+                    grows: certain_growth(motions, k) > 0.0,
+                    displacement: &shape.displacement,
+                    later_displacement: (!in_phase).then_some(&shape.later_displacement[..]),
+                }
+            })
+        });
+        modes.chain(shapes).collect()
+    }
+
+    /// Growing ones are red.
+    fn color(&self) -> Color {
+        match self.grows {
+            true => SECOND_SOLUTION_COLOR,
+            false => NOTE_COLOR,
+        }
+    }
+}
+
 pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
     let setting = FigureSetting::from_scenario(scenario);
     let name = format!("{}: modes", equilibrium.scenario);
     let rest = DrawnVeins::from_equilibrium(equilibrium, scenario);
-    let modes = equilibrium.stability.modes.as_deref().unwrap_or_default();
+    let modes = DrawnMode::lowest(equilibrium, &scenario.units);
     let drawn = &modes[..modes.len().min(MOST_MODES_DRAWN)];
-    let shapes = drawn
-        .iter()
-        .map(|mode| displaced_veins(equilibrium, &rest, mode));
-    let shapes: Vec<DrawnVeins> = shapes.collect();
+    let shapes = drawn.iter().map(|mode| {
+        let size = drawn_size(&rest, mode.displacement);
+        let now = displaced_veins(equilibrium, &rest, mode.displacement, size);
+        let later = mode.later_displacement;
+        (
+            now,
+            later.map(|later| displaced_veins(equilibrium, &rest, later, size)),
+        )
+    });
+    let shapes: Vec<(DrawnVeins, Option<DrawnVeins>)> = shapes.collect();
     // Every mode in two views: a motion towards the viewer in one is visible in the other.
     let views = [ViewAngles::oblique([rest.tip_from_base()]), FRONT_VIEW];
     let count = views.len() * drawn.len();
-    let all = shapes.iter().chain([&rest]);
-    let panels = SmallPanels::seen_from(views[0], all, count, &setting, PAGE.header);
+    let all = shapes
+        .iter()
+        .flat_map(|(now, later)| [now].into_iter().chain(later));
+    let panels = SmallPanels::seen_from(views[0], all.chain([&rest]), count, &setting, PAGE.header);
     let mut notes = vec![
         format!("N = {}", rest.count),
         relaxation_verdict(equilibrium),
@@ -322,18 +379,22 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
         count if count > MOST_MODES_DRAWN => format!("the lowest {MOST_MODES_DRAWN} of {count}"),
         count => format!("the lowest {count}"),
     });
-    notes.push("grey: at rest".into());
+    let out_of_phase = shapes.iter().any(|(_, later)| later.is_some());
+    notes.push(match out_of_phase {
+        true => "grey: at rest; dashed: a quarter of a period later".into(),
+        false => "grey: at rest".into(),
+    });
     notes.extend(rest.leaf_notes(&setting));
     let mut drawing = new_page(PAGE.side_margin, &name, &notes, Some(&rest));
     drawing.height = panels.bottom();
-    for (index, (mode, veins)) in drawn.iter().zip(&shapes).enumerate() {
+    for (index, (mode, (veins, later))) in drawn.iter().zip(&shapes).enumerate() {
         drawing.draw_group("mode", |page| {
-            let (number, text) = ((index + 1).to_string(), mode_text(mode, &scenario.units));
+            let number = (index + 1).to_string();
             let captions = [
                 PanelCaption {
                     letter: &number,
-                    text: &text,
-                    color: mode_color(mode),
+                    text: &mode.text,
+                    color: mode.color(),
                 },
                 PanelCaption {
                     letter: "",
@@ -345,9 +406,18 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
                 let place = views.len() * index + k;
                 let scene = panels.draw_empty_panel(page, place, 0.0, view, caption);
                 let width = SMALL_LINE_WIDTH_FACTOR * veins.line_width();
-                for vein in &rest.veins {
-                    let path = vein.projected_path(|point| scene.project_point(point));
-                    page.draw_stroke(path, Stroke::new(FRAME_COLOR, 0.6 * width));
+                let mut draw_thin = |veins: &DrawnVeins, stroke: Stroke| {
+                    for vein in &veins.veins {
+                        let path = vein.projected_path(|point| scene.project_point(point));
+                        page.draw_stroke(path, stroke);
+                    }
+                };
+                draw_thin(&rest, Stroke::new(FRAME_COLOR, 0.6 * width));
+                if let Some(later) = later {
+                    draw_thin(
+                        later,
+                        Stroke::new(NOTE_COLOR, 0.6 * width).with_dashes(true),
+                    );
                 }
                 scene.draw_leaf(page, veins, width);
             }
@@ -358,37 +428,77 @@ pub fn draw_modes(equilibrium: &Equilibrium, scenario: &Scenario) -> Drawing {
 
 /// The frequency of a mode or, if it is unstable, its growth rate: cycles per time where the scenario names
 /// its unit of time, and otherwise the angular frequency.
-pub fn mode_text(mode: &Mode, units: &Units) -> String {
-    let angular = mode.frequency().unwrap_or_default();
-    match (mode.is_neutral(), mode.growth(), units.frequency()) {
-        (true, ..) => "neutral: ω = 0".into(),
-        (_, None, None) => format!("ω = {}", format_four_digits(angular)),
-        (_, None, Some(unit)) => format!("{} {unit}", format_four_digits(angular / TAU)),
-        (_, Some(growth), _) => format!(
-            "unstable: grows at {}",
-            number_in_unit(format_four_digits(growth), units, RATE)
-        ),
+fn mode_text(mode: &Mode, units: &Units) -> String {
+    match (mode.is_neutral(), mode.growth()) {
+        (true, _) => "neutral: ω = 0".into(),
+        (_, None) => frequency_text(mode.frequency().unwrap_or_default(), units),
+        (_, Some(growth)) => format!("unstable: grows at {}", rate_text(growth, units)),
     }
 }
 
-/// Unstable modes are red.
-fn mode_color(mode: &Mode) -> Color {
-    match mode.growth() {
-        Some(_) if !mode.is_neutral() => SECOND_SOLUTION_COLOR,
-        _ => NOTE_COLOR,
+/// An angular frequency; cycles per time where the scenario names its unit of time.
+fn frequency_text(angular: f64, units: &Units) -> String {
+    match units.frequency() {
+        None => format!("ω = {}", format_four_digits(angular)),
+        Some(unit) => format!("{} {unit}", format_four_digits(angular / TAU)),
     }
 }
 
-fn displaced_veins(equilibrium: &Equilibrium, rest: &DrawnVeins, mode: &Mode) -> DrawnVeins {
-    let most = |shape: &[DVec3]| shape.iter().fold(0.0_f64, |m, d| m.max(d.length()));
-    let largest = mode.displacement.iter().fold(0.0, |m, d| most(d).max(m));
-    let size = match largest > 0.0 {
+fn rate_text(rate: f64, units: &Units) -> String {
+    number_in_unit(format_four_digits(rate), units, RATE)
+}
+
+/// The growth rate of a small motion, zero where that is within its error.
+fn certain_growth(motions: &SmallMotions, k: usize) -> f64 {
+    let error = motions.errors.as_ref().map_or(0.0, |errors| errors[k]);
+    let growth = motions.growth_rates[k];
+    if growth.abs() > error { growth } else { 0.0 }
+}
+
+/// The frequency of a small motion, if it oscillates, and its growth.
+fn small_motion_text(motions: &SmallMotions, k: usize, units: &Units) -> String {
+    let (growth, frequency) = (certain_growth(motions, k), motions.frequencies[k]);
+    let rate = rate_text(growth.abs(), units);
+    let growth = match growth {
+        growth if growth > 0.0 => format!("unstable: grows at {rate}"),
+        growth if growth < 0.0 => format!("decays at {rate}"),
+        _ => String::new(),
+    };
+    let frequency = match frequency > 0.0 {
+        true => frequency_text(frequency, units),
+        false => String::new(),
+    };
+    let parts = [frequency, growth].into_iter().filter(|it| !it.is_empty());
+    match parts.collect::<Vec<_>>() {
+        parts if parts.is_empty() => "neutral: ω = 0".into(),
+        parts => parts.join(", "),
+    }
+}
+
+fn largest_length(shape: &[Vec<DVec3>]) -> f64 {
+    let all = shape.iter().flatten();
+    all.fold(0.0, |largest, node| largest.max(node.length()))
+}
+
+/// The factor on a displacement that is drawn.
+fn drawn_size(rest: &DrawnVeins, displacement: &[Vec<DVec3>]) -> f64 {
+    let largest = largest_length(displacement);
+    match largest > 0.0 {
         // Never magnified: displacements are small in a mode of rotation alone.
         true => (LARGEST_DRAWN_AMPLITUDE * rest.largest_extent() * rest.unit / largest).min(1.0),
         false => 0.0,
-    };
+    }
+}
+
+/// The leaf displaced by a shape times a factor.
+fn displaced_veins(
+    equilibrium: &Equilibrium,
+    rest: &DrawnVeins,
+    displacement: &[Vec<DVec3>],
+    size: f64,
+) -> DrawnVeins {
     let shape = &equilibrium.shape;
-    let moved = shape.curves.iter().zip(&mode.displacement);
+    let moved = shape.curves.iter().zip(displacement);
     let curves: Vec<Vec<DVec3>> = moved
         .map(|(curve, by)| curve.iter().zip(by).map(|(x, d)| x + size * d).collect())
         .collect();

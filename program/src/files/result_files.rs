@@ -51,7 +51,11 @@ impl WrittenResult for Equilibrium {
             return (self.sensitivities.as_ref()).is_some_and(|found| !found.is_empty());
         }
         let modes = self.stability.modes.as_deref();
-        self.stability.mode_shapes && modes.is_some_and(|modes| !modes.is_empty())
+        let motions = self.stability.small_motions.as_ref();
+        let shapes = motions.and_then(|motions| motions.shapes.as_deref());
+        self.stability.mode_shapes
+            && (modes.is_some_and(|modes| !modes.is_empty())
+                || shapes.is_some_and(|shapes| !shapes.is_empty()))
     }
 }
 

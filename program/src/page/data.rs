@@ -113,6 +113,9 @@ pub struct ModeShape {
     pub nodes: usize,
     pub rest: String,
     pub displacement: String,
+    /// Their displacements a quarter of a period later, where nodes move out of phase.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub later: Option<String>,
 }
 
 /// Curves of quantities, one of which is chosen.

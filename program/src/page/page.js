@@ -35,13 +35,13 @@ function sampled(most) {
 
 /// Those that set the limits of the colours.
 function limiting() {
-  return shown.mode >= 0 ? [1, -1].map((amplitude) => inMode(view.modes[shown.mode], amplitude)) : sampled(40);
+  return shown.mode >= 0 ? [0, 0.5, 1, 1.5].map((part) => inMode(view.modes[shown.mode], part * Math.PI)) : sampled(40);
 }
 
 /// The leaves in the panels: several, or one: as given, between two instants, or in a mode.
 function currentLeaves() {
   if (several) return shown.alone < 0 ? sampled(Infinity) : [leafAt(shown.alone)];
-  if (shown.mode >= 0) return [inMode(view.modes[shown.mode], Math.sin(shown.phase))];
+  if (shown.mode >= 0) return [inMode(view.modes[shown.mode], shown.phase)];
   const index = Math.min(Math.floor(shown.at), view.leaves.length - 1);
   const [a, part] = [leafAt(index), shown.at - index];
   if (view.kind !== "motion" || part < 1e-6 || index + 1 >= view.leaves.length) return [a];

@@ -5,7 +5,7 @@ use crate::figure;
 use crate::figure::FigureFunction;
 use crate::figure::drawing::space::ViewAngles;
 use crate::figure::drawing::veins::DrawnVeins;
-use crate::figure::leaf::mode_text;
+use crate::figure::leaf::DrawnMode;
 use crate::figure::motion::small_motion_origin;
 use crate::figure::scenario::{LoadMark, name_with_unit, with_followers_as_dead};
 use crate::page::data::{ModeShape, PageChart, PageCurve, PageData, PageLeaf, encode_vectors};
@@ -17,7 +17,7 @@ use crate::report::{
     ReportedResult, equilibrium_kind, is_codimension_two, relaxation_verdict, stability_phrase,
 };
 use glam::DVec3;
-use leafdyn::relax::{Equilibrium, Mode};
+use leafdyn::relax::Equilibrium;
 use leafdyn::scenario::{Scenario, Units};
 use leafdyn::simulate::{OutputSample, Record};
 use leafdyn::study::{
@@ -48,9 +48,10 @@ impl PageResult for Equilibrium {
             ..PageLeaf::with_node_states("at rest".into(), self, view)
         });
         if self.stability.mode_shapes {
-            let modes = self.stability.modes.iter().flatten().enumerate();
+            let modes = DrawnMode::lowest(self, &scenario.units);
+            let modes = modes.iter().enumerate();
             view.modes = modes
-                .map(|(k, mode)| mode_shape(self, k + 1, mode, &view.drawn, &scenario.units))
+                .map(|(k, mode)| mode_shape(self, k + 1, mode, &view.drawn))
                 .collect();
         }
     }
@@ -61,22 +62,17 @@ fn loads_on_leaf(leaf: &Equilibrium, scenario: &Scenario) -> Vec<LoadMark> {
     loads_on_drawn_veins(&with_followers_as_dead(scenario, leaf), None)
 }
 
-fn mode_shape(
-    leaf: &Equilibrium,
-    number: usize,
-    mode: &Mode,
-    drawn: &[usize],
-    units: &Units,
-) -> ModeShape {
+fn mode_shape(leaf: &Equilibrium, number: usize, mode: &DrawnMode, drawn: &[usize]) -> ModeShape {
     let pick = |of: &[Vec<DVec3>]| {
         let chosen = drawn.iter().filter_map(|&number| of.get(number - 1));
         encode_vectors(chosen.flatten().copied())
     };
     ModeShape {
-        label: format!("mode {number}: {}", mode_text(mode, units)),
+        label: format!("mode {number}: {}", mode.text),
         nodes: mode.displacement.first().map_or(0, Vec::len),
         rest: pick(&leaf.shape.curves),
-        displacement: pick(&mode.displacement),
+        displacement: pick(mode.displacement),
+        later: mode.later_displacement.map(pick),
     }
 }
 

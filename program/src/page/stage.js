@@ -388,15 +388,19 @@ function fillQuantities() {
   find("quantity").value = shown.quantity;
 }
 
-/// The leaf in a mode, displaced by a visible part of it.
-function inMode(mode, amplitude) {
+/// The leaf in a mode at a phase, displaced by a visible part of it, or by a part `swing` of that: nodes that move out of
+/// phase have one more shape, a quarter of a period later.
+function inMode(mode, phase, swing = 1) {
   if (!mode.decoded) {
     mode.decoded = new Float32Array(bytes(mode.rest));
     mode.by = new Float32Array(bytes(mode.displacement));
+    mode.after = mode.later && new Float32Array(bytes(mode.later));
     const largest = Math.max(largestSize(mode.by), 1e-30);
     mode.size = Math.min(1, (0.2 * space.box.extent) / largest);
   }
-  const points = mode.decoded.map((x, i) => x + amplitude * mode.size * mode.by[i]);
+  const size = swing * mode.size;
+  const [now, after] = [size * Math.sin(phase), -size * Math.cos(phase)];
+  const points = mode.decoded.map((x, i) => x + now * mode.by[i] + (mode.after ? after * mode.after[i] : 0));
   return { label: mode.label, nodes: mode.nodes, stations: evenly(mode.nodes), points, state: null };
 }
 

@@ -344,7 +344,8 @@ fn margin_waves_line(equilibrium: &Equilibrium, units: &Units) -> Option<String>
 /// The lowest eigenvalues, as growth rates per time and frequencies in cycles per time.
 fn lowest_modes_line(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let Some(modes) = &equilibrium.stability.modes else {
-        let asked = equilibrium.stability.mode_shapes;
+        let stability = &equilibrium.stability;
+        let asked = stability.mode_shapes && stability.small_motions.is_none();
         return asked.then(|| "not known".into());
     };
     let unstable = |mode: &&Mode| mode.growth().is_some();

@@ -3,7 +3,7 @@
 //! station.
 
 use glam::DVec3;
-use leafdyn::relax::{Equilibrium, NodeState, Sensitivity};
+use leafdyn::relax::{Equilibrium, NodeState, Sensitivity, SmallMotions};
 use leafdyn::scenario::Stress;
 use leafdyn::shape::{InterpolationWeights, interpolation_weights};
 use leafdyn::surface::AngleDistribution;
@@ -270,30 +270,85 @@ pub fn write_centerlines(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::
 /// rotation vectors are along the lab axes.
 const MODES_HEADER: &str = "mode,eigenvalue,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz";
 
+/// Names of the columns of small motions without a potential, the last of which are those a quarter of a period later.
+const MOTIONS_HEADER: &str = "mode,growth_rate,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz,\
+                              later_dx,later_dy,later_dz,later_rx,later_ry,later_rz";
+
+/// A station of the rods, and the weights of nodes beside it.
+struct InterpolatedStation {
+    sigma: f64,
+    near: InterpolationWeights,
+}
+
+impl InterpolatedStation {
+    fn all(equilibrium: &Equilibrium) -> Vec<Self> {
+        let shape = &equilibrium.shape;
+        let stations = shape.stations.iter().map(|&sigma| InterpolatedStation {
+            sigma,
+            near: interpolation_weights(&shape.curve_stations, sigma, CUBIC_NODES),
+        });
+        stations.collect()
+    }
+
+    /// The vector there of a rod that has these at its nodes.
+    fn vector(&self, nodes: &[DVec3]) -> DVec3 {
+        let InterpolationWeights { first, weights } = &self.near;
+        let near = weights.iter().zip(&nodes[*first..]);
+        near.map(|(weight, node)| *weight * *node).sum()
+    }
+}
+
+/// The components of two vectors, of which none is minus zero.
+fn components([d, r]: [DVec3; 2]) -> [f64; 6] {
+    [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0)
+}
+
 /// `modes.csv`: one row per mode, rod and station.
 pub fn write_modes_table(equilibrium: &Equilibrium, out: &mut dyn Write) -> io::Result<()> {
+    let stations = InterpolatedStation::all(equilibrium);
+    let motions = equilibrium.stability.small_motions.as_ref();
+    if let Some(motions) = motions.filter(|motions| motions.shapes.is_some()) {
+        return write_motions_table(motions, &stations, out);
+    }
     out.write_all(&table_header(MODES_HEADER))?;
     let mut table = csv_writer_without_header(out);
-    let shape = &equilibrium.shape;
-    let place = |&at: &f64| {
-        (
-            at,
-            interpolation_weights(&shape.curve_stations, at, CUBIC_NODES),
-        )
-    };
-    let places: Vec<_> = shape.stations.iter().map(place).collect();
     for (index, mode) in equilibrium.stability.modes.iter().flatten().enumerate() {
         let of_mode = (index + 1, mode.eigenvalue, mode.error, mode.frequency());
         let rods = mode.displacement.iter().zip(&mode.rotation);
         for (rod, (displacement, rotation)) in rods.enumerate() {
-            for (sigma, InterpolationWeights { first, weights }) in &places {
-                let at = |nodes: &[DVec3]| -> DVec3 {
-                    let near = weights.iter().zip(&nodes[*first..]);
-                    near.map(|(weight, node)| *weight * *node).sum()
+            for station in &stations {
+                let shape = [displacement, rotation].map(|nodes| station.vector(nodes));
+                table.serialize((of_mode, rod + 1, station.sigma, components(shape)))?;
+            }
+        }
+    }
+    table.flush()
+}
+
+/// One row per small motion, rod and station.
+fn write_motions_table(
+    motions: &SmallMotions,
+    stations: &[InterpolatedStation],
+    out: &mut dyn Write,
+) -> io::Result<()> {
+    out.write_all(&table_header(MOTIONS_HEADER))?;
+    let mut table = csv_writer_without_header(out);
+    for (k, shape) in motions.shapes.iter().flatten().enumerate() {
+        let error = motions.errors.as_ref().map(|errors| errors[k]);
+        let of_motion = (
+            k + 1,
+            motions.growth_rates[k],
+            error,
+            motions.frequencies[k],
+        );
+        for rod in 0..shape.displacement.len() {
+            for station in stations {
+                let vectors = |fields: [&Vec<Vec<DVec3>>; 2]| {
+                    components(fields.map(|field| station.vector(&field[rod])))
                 };
-                let [d, r] = [at(displacement), at(rotation)];
-                let shape = [d.x, d.y, d.z, r.x, r.y, r.z].map(|value| value + 0.0);
-                table.serialize((of_mode, rod + 1, sigma, shape))?;
+                let now = vectors([&shape.displacement, &shape.rotation]);
+                let later = vectors([&shape.later_displacement, &shape.later_rotation]);
+                table.serialize((of_motion, rod + 1, station.sigma, now, later))?;
             }
         }
     }

@@ -43,7 +43,6 @@ const REFUSED: &str = "
     relax scenarios/motion/gust.toml => wind.velocity: a leaf comes to rest in steady wind only
     relax scenarios/motion/gust.toml --path release => wind.velocity: a leaf comes to rest in steady wind only
     relax scenarios/motion/gust.toml --path release --method explicit => [wind]: explicit relaxation does not
-    relax scenarios/motion/gust.toml --path release --modes 3 => [wind]: a list of modes does not
     relax scenarios/motion/gust.toml --keep-unstable => [wind]: the search for an equilibrium of any index does not
     relax scenarios/motion/gust.toml --method shooting => [wind]: shooting in wind that changes does not
     relax scenarios/motion/gust.toml --method shooting-from-rest => [wind]: shooting in wind that changes does not

@@ -115,6 +115,42 @@ fn a_single_grid_claims_no_accuracy() {
     place.holds("out/small", &with_modes());
 }
 
+/// Without a potential modes are small motions, whose nodes may be out of phase, and have the files of modes.
+#[test]
+fn small_motions_have_the_files_of_modes() {
+    let place = Workplace::new();
+    let run = place.run(
+        "relax leaf.toml --set load.follower=[0.05,-0.1,0.2] --set dynamics.internal_damping=0.01 \
+         --modes 2 --json --write csv,svg,html",
+    );
+    let summary = run.json();
+    let columns = "mode,growth_rate,error,frequency,rod,sigma,dx,dy,dz,rx,ry,rz,\
+                   later_dx,later_dy,later_dz,later_rx,later_ry,later_rz";
+    let rows = place.table("out/small/modes.csv", columns);
+    let numbers = |key: &str| floats(&summary[key]);
+    let stations = summary["stations"].list().len();
+    assert_eq!(rows.len() % (stations * numbers("growth_rates").len()), 0);
+    for row in &rows {
+        let mode: usize = row[0].parse().unwrap();
+        for (column, key) in [
+            (1, "growth_rates"),
+            (2, "motion_errors"),
+            (3, "frequencies"),
+        ] {
+            assert_eq!(row[column].parse::<f64>().unwrap(), numbers(key)[mode - 1]);
+        }
+        // The base is held.
+        if row[5] == "0.0" {
+            assert!(row[6..].iter().all(|it| it == "0.0"), "{row:?}");
+        }
+    }
+    let later = |row: &Vec<String>| row[12..].iter().any(|it| it != "0.0");
+    assert!(rows.iter().any(later));
+    let figure = place.read("out/small/modes.svg");
+    contains(&figure, &["decays at", "a quarter of a period later"]);
+    contains(&place.read("out/small/view.html"), &["\"later\":"]);
+}
+
 #[test]
 fn a_folder_that_is_a_file_is_refused() {
     let place = Workplace::new();

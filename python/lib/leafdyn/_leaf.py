@@ -293,7 +293,7 @@ class Equilibrium(Viewed):
         return self._core.effective_masses()
 
     @computed
-    def _mode_shapes(self) -> tuple[Array, Array]:
+    def _mode_shapes(self) -> tuple[Array, Array, Array, Array]:
         return self._core.mode_shapes()
 
     @property
@@ -305,6 +305,18 @@ class Equilibrium(Viewed):
     def mode_rotations(self) -> Array:
         """Rotation vectors of these nodes along the lab axes, radians, shape (modes, N, M + 1, 3)."""
         return self._mode_shapes[1]
+
+    @property
+    def mode_later_displacements(self) -> Array:
+        """Displacements of these nodes a quarter of a period after those of `mode_displacements`, but for growth, shape
+        (modes, N, M + 1, 3): not zero where damping, wind or flutter let nodes move out of phase. At a time t a leaf is
+        displaced by exp(growth_rate t) (displacement cos(omega t) + later displacement sin(omega t))."""
+        return self._mode_shapes[2]
+
+    @property
+    def mode_later_rotations(self) -> Array:
+        """Rotation vectors of these nodes then, radians, shape (modes, N, M + 1, 3)."""
+        return self._mode_shapes[3]
 
     @computed
     def sensitivities(self) -> dict[str, Sensitivity]:
@@ -368,7 +380,7 @@ class Equilibrium(Viewed):
         -0.1474
         """
         rods, modes, line = ("rod",), ("mode",), ("rod", "curve_station")
-        shapes = getattr(self, "_mode_shapes", (np.empty(0), np.empty(0)))
+        shapes = getattr(self, "_mode_shapes", (np.empty(0),) * 4)
         some = shapes[0].size > 0
         variables = {
             **node_variables(self._nodes(), ("rod", "station")),
@@ -380,15 +392,20 @@ class Equilibrium(Viewed):
             "eigenvalues": (modes, self.eigenvalues, (0, 0, -2)),
             "eigenvalue_errors": (modes, self.eigenvalue_errors, (0, 0, -2)),
             "frequencies": (modes, self.frequencies, (0, 0, -1)),
+            "growth_rates": (modes, self.growth_rates, (0, 0, -1)),
             "effective_masses": ((*modes, "component"), getattr(self, "effective_masses", None), (-1, 1, 2)),
             "mode_displacements": ((*modes, *line, "component"), shapes[0] if some else None, None),
             "mode_rotations": ((*modes, *line, "component"), shapes[1] if some else None, None),
+            **{
+                f"mode_later_{name}": ((*modes, *line, "component"), shape if some and shape.any() else None, None)
+                for name, shape in zip(("displacements", "rotations"), shapes[2:], strict=True)
+            },
         }
         coordinates: dict[str, Any] = {"rod": range(1, self.rods + 1), "station": self.stations}
         if some:
             coordinates["curve_station"] = self.curve_stations
-        if self.eigenvalues is not None:
-            coordinates["mode"] = range(1, len(self.eigenvalues) + 1)
+        if self.frequencies is not None:
+            coordinates["mode"] = range(1, len(self.frequencies) + 1)
         return dataset(variables, coordinates, self._units, self._attrs)
 
     @property

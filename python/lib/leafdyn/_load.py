@@ -225,6 +225,9 @@ def _reaction(said: Said) -> tuple[NDArray[np.float64], NDArray[np.float64]] | N
 
 def _event(said: Said) -> str:
     """As the program says it."""
+    if said["kind"] == "bent-sharply":
+        what = "bent sharply, where a perfect leaf would turn to either side,"
+        return f"{what} at {100.0 * said['part']:.0f} % of {said['stage']}"
     aside = "turned to one of two equal sides" if said.get("equally_open") else "turned aside"
     what = f"{aside if said['kind'] == 'branched' else said['kind']} at {100 * said['part']:.0f} % of {said['stage']}"
     if "motion" not in said:

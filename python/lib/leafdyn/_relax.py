@@ -393,13 +393,15 @@ def modes(
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and its lowest modes of vibration there, with their shapes.
 
-    Parameters are those of `relax`; ``count``: how many modes.
+    Parameters are those of `relax`; ``count``: how many modes. Without a potential (wind, loads that turn with the section)
+    these are the small motions next to zero, and further ones that grow.
 
     Returns
     -------
     Equilibrium
         With ``eigenvalues``, ``eigenvalue_errors``, ``frequencies``, ``effective_masses``, ``mode_displacements`` and
-        ``mode_rotations``.
+        ``mode_rotations``; without a potential with ``growth_rates`` in place of eigenvalues, and
+        ``mode_later_displacements`` and ``mode_later_rotations``.
 
     Examples
     --------

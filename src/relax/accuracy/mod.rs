@@ -319,6 +319,11 @@ impl NestedEquilibrium {
         self.index == Some(0)
     }
 
+    /// The requested error of positions, in lengths of the leaf.
+    pub fn requested_tolerance(&self) -> f64 {
+        self.tolerance
+    }
+
     /// The next finer grid, if the limits on its size allow it and rounding leaves something
     /// to gain.
     pub fn next_finer_grid(&self) -> Option<Grid> {

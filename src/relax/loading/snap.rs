@@ -7,9 +7,10 @@
 //! energy falls, and ends at the bottom of the valley that this leads to. Where steps are long it
 //! is Newton's method.
 
-use crate::leaf::BucklingMode;
+use crate::homotopy::{StepEnd, StepSizes};
+use crate::leaf::{BucklingMode, NodalField, State};
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};
-use crate::relax::loading::LoadPath;
+use crate::relax::loading::{LoadPath, LoadStepOutcome, PathState};
 use crate::relax::path::StabilityLoss;
 use crate::relax::saddle::{
     SideOfSaddle, converge_saddle, displace, escape_saddle, find_unstable_mode, index,
@@ -69,6 +70,41 @@ const MOTION: ViscousMotion = ViscousMotion {
 /// A leaf that moves no farther (lengths, radians) has not snapped.
 const LARGEST_CONTINUOUS_MOTION: f64 = 0.05;
 
+/// Steps back along the path from an equilibrium to which the leaf has moved, as parts of the way to the last one before:
+/// beside a bifurcation of a nearly perfect leaf they are short.
+const RETURN_STEPS: StepSizes = StepSizes {
+    first: 0.25,
+    shortest: 1e-3,
+    longest: 0.25,
+    growth: 2.0,
+    failure: 0.25,
+};
+
+/// Least amplitude of the mode (lengths, radians) by which a leaf moves between an equilibrium before a bifurcation and
+/// the unstable one behind it that is no rounding.
+const LEAST_IMPERFECTION: f64 = 1e-6;
+
+/// The amplitude of a mode in which the last equilibrium before a bifurcation differs from the unstable one behind it:
+/// zero of a perfect leaf. An imperfect one has e/|m| before and -e/m behind, where 0 = e + m a - a^3 for an
+/// imperfection e (M. Golubitsky and D. Schaeffer, Singularities and Groups in Bifurcation Theory I, 1985), and bends to
+/// the side of e.
+fn imperfection(before: &State, behind: &State, mode: &NodalField, first: usize) -> f64 {
+    let mut way = NodalField::new();
+    behind.increments_to(before, first, &mut way);
+    let product = |a: &NodalField, b: &NodalField| -> f64 {
+        let a = a.iter().flatten().flatten();
+        a.zip(b.iter().flatten().flatten())
+            .map(|(a, b)| a * b)
+            .sum()
+    };
+    let largest = mode
+        .iter()
+        .flatten()
+        .flatten()
+        .fold(0.0_f64, |m, it| m.max(it.abs()));
+    largest * product(&way, mode) / product(mode, mode)
+}
+
 impl LoadPath<'_> {
     /// From the unstable equilibrium in which Newton's method has put the next state the leaf
     /// turns to one of its sides.
@@ -80,6 +116,8 @@ impl LoadPath<'_> {
             return Err(EquilibriumFailure::NoDescent);
         }
         let mode = self.system.solution();
+        let last = self.previous_states.last().expect("states");
+        let amplitude = imperfection(&last.state, &saddle, &mode, leaf.first_node());
         let mut found: [Option<SideOfSaddle>; 2] = [None, None];
         let mut stopped = EquilibriumFailure::NoDescent;
         for (found, sign) in found.iter_mut().zip([1.0, -1.0]) {
@@ -92,6 +130,11 @@ impl LoadPath<'_> {
                 }
                 Err(stop) => stopped = stop,
             }
+        }
+        if let Some(side) = self.only_continuation(part, &found, amplitude) {
+            self.next = side;
+            self.record_event(part, StabilityLoss::BentSharply);
+            return Ok(());
         }
         let side = lower_energy_side(found).ok_or(stopped)?;
         self.next = side.state;
@@ -107,9 +150,82 @@ impl LoadPath<'_> {
         let before = self.next.clone();
         self.relax_next_state()?;
         if before.distance(&self.next) > LARGEST_CONTINUOUS_MOTION {
-            self.record_event(part, StabilityLoss::Snapped);
+            let lost = match self.leads_back(part) {
+                true => StabilityLoss::BentSharply,
+                false => StabilityLoss::Snapped,
+            };
+            self.record_event(part, lost);
         }
         Ok(())
+    }
+
+    /// Of an imperfect leaf the one of two sides from which the path leads back to the last equilibrium: then nothing was
+    /// lost, and the other side is one of another path. Where that path is too near to be told apart it leads back from
+    /// both, and the imperfection decides.
+    fn only_continuation(
+        &mut self,
+        part: f64,
+        sides: &[Option<SideOfSaddle>; 2],
+        amplitude: f64,
+    ) -> Option<State> {
+        let [Some(one), Some(other)] = sides else {
+            return None;
+        };
+        if amplitude.abs() <= LEAST_IMPERFECTION {
+            return None;
+        }
+        let [one, other] = [one, other].map(|side| side.state.clone());
+        let leads_back = [&one, &other].map(|side| {
+            self.next.clone_from(side);
+            self.leads_back(part)
+        });
+        match leads_back {
+            [true, false] => Some(one),
+            [false, true] => Some(other),
+            [true, true] if amplitude > 0.0 => Some(one),
+            [true, true] => Some(other),
+            [false, false] => None,
+        }
+    }
+
+    /// Whether slow unloading leads from the next state, at this part, to the last one before it, stably all the way.
+    /// The next state stays as it is.
+    fn leads_back(&mut self, part: f64) -> bool {
+        let arrived = self.next.clone();
+        let (before, reached) = (std::mem::take(&mut self.previous_states), self.lambda);
+        let Some(last) = before.last() else {
+            return false;
+        };
+        let from = last.lambda;
+        self.previous_states.push(PathState {
+            lambda: part,
+            state: arrived.clone(),
+        });
+        let back = RETURN_STEPS.follow(|step| {
+            if self.work.force_evaluations > self.most_evaluations || self.limit.reached() {
+                return StepEnd::Ended(EquilibriumFailure::StepLimit);
+            }
+            let to = part + step.to * (from - part);
+            let stable = matches!(self.step_to(to, false), LoadStepOutcome::Stable(_));
+            // A leaf that moves farther may have come to another path.
+            let last = self.previous_states.last();
+            let moved = last.map_or(0.0, |last| self.next.distance(&last.state));
+            match stable && moved <= LARGEST_CONTINUOUS_MOTION {
+                true => {
+                    self.accept(to);
+                    StepEnd::Made {
+                        growth: RETURN_STEPS.growth,
+                    }
+                }
+                false => StepEnd::TooLong(EquilibriumFailure::NoDescent),
+            }
+        });
+        let there = back.is_ok() && self.next.distance(&last.state) <= LARGEST_CONTINUOUS_MOTION;
+        (self.previous_states, self.lambda) = (before, reached);
+        self.next = arrived;
+        self.loading.carry_to_lambda([part; 2], &mut self.next);
+        self.system.set_coupling(&self.loading.leaf);
+        there
     }
 
     /// Moves the next state to rest, leaving saddles.
@@ -223,5 +339,41 @@ impl SpringRate {
             _ => MOTION.first_increase,
         };
         self.now = self.factor * self.now.max(MOTION.least_rate);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Scenario;
+
+    /// A column beyond the weight under which a perfect one buckles, a little out of plumb or not.
+    fn column(bending: [f64; 2], push: f64) -> Scenario {
+        let text = format!(
+            r#"
+            name = "column"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+            stiffness = {{ torsion = 1.0, bending_2 = {:?}, bending_3 = {:?}, axial = inf, shear_2 = inf, shear_3 = inf }}
+            load = {{ gravity = [-9.0, 0.0, {push:?}] }}
+            "#,
+            bending[0], bending[1]
+        );
+        Scenario::from_toml(&text).unwrap()
+    }
+
+    #[test]
+    fn an_imperfect_column_bends_to_its_side_and_a_perfect_one_turns_aside() {
+        for push in [4e-6, -4e-6, -2e-4] {
+            let leaf = column([1.0, 1.3], push).relax().unwrap();
+            assert!(leaf.tips[0].z * push > 0.0, "{push}: {}", leaf.tips[0]);
+            let path = leaf.path.unwrap();
+            assert_eq!(path.word(), "stable-throughout", "{push}: {path:?}");
+            assert_eq!(path.events()[0].happening, StabilityLoss::BentSharply);
+        }
+        for bending in [[1.0, 1.3], [1.0, 1.0]] {
+            let leaf = column(bending, 0.0).relax().unwrap();
+            assert_eq!(leaf.path.unwrap().word(), "branched", "{bending:?}");
+            assert!(leaf.work.steps < 500, "{bending:?}: {:?}", leaf.work);
+        }
     }
 }

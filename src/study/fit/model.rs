@@ -15,7 +15,7 @@ use crate::study::fit::data::{
     Data, DataOrigin, ExperimentCase, MeasuredValue, TracedVeinPoint, experiment_cases,
 };
 use crate::study::fit::free::{FitCoordinate, FreeParameterTarget};
-use crate::study::fit::prediction::{CaseSolution, DatumQuantity, ScalarDatum};
+use crate::study::fit::prediction::{CaseSolution, DatumQuantity, FrequencyAccuracy, ScalarDatum};
 use crate::study::{BaseScenario, ParameterKeys};
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -257,14 +257,23 @@ impl<'a> FitModel<'a> {
         }
     }
 
-    /// Predictions of a leaf at rest for the data of an experiment, less the offsets of their columns.
+    /// Predictions of a leaf at rest for the data of an experiment, less the offsets of their columns, on its grids and,
+    /// as needed, on finer ones.
     pub(super) fn solved_case(
         &self,
         case: usize,
         theta: &[f64],
         at: NestedEquilibrium,
+        grids: GridPolicy,
     ) -> Result<CaseSolution, ContinuationFailure> {
-        let mut found = CaseSolution::new(&self.cases[case], at)?;
+        let accuracy = match grids {
+            GridPolicy::These => FrequencyAccuracy::OnTheseGrids,
+            GridPolicy::AsNeeded => FrequencyAccuracy::Within {
+                tolerance: self.equilibrium_tolerance(),
+                limit: &self.options.limit,
+            },
+        };
+        let mut found = CaseSolution::new(&self.cases[case], at, accuracy)?;
         for (free, theta) in self.coordinates.iter().zip(theta) {
             let offset = free.inverse_transform(*theta);
             let own = found
@@ -295,7 +304,7 @@ impl<'a> FitModel<'a> {
         let find = |case: usize| -> Result<CaseSolution, FitError> {
             let scenario = self.case_scenario(&self.cases[case], theta)?;
             let found = NestedEquilibrium::relax_to_stable(&scenario, &self.options)?;
-            let found = found.and_then(|at| self.solved_case(case, theta, at));
+            let found = found.and_then(|at| self.solved_case(case, theta, at, self.grids));
             found.map_err(|lost| self.no_equilibrium_error(theta, case, &lost))
         };
         self.assemble_point(theta, find)
@@ -310,7 +319,7 @@ impl<'a> FitModel<'a> {
         let find = |case: usize| -> Result<CaseSolution, FitError> {
             let scenario = self.case_scenario(&self.cases[case], theta)?;
             let found = NestedEquilibrium::find_within(&scenario, &self.options, most_steps)?;
-            let found = found.and_then(|at| self.solved_case(case, theta, at));
+            let found = found.and_then(|at| self.solved_case(case, theta, at, self.grids));
             found.map_err(|lost| self.no_equilibrium_error(theta, case, &lost))
         };
         self.assemble_point(theta, find)
@@ -395,7 +404,7 @@ impl<'a> FitModel<'a> {
             let at =
                 from.equilibrium
                     .continue_to_scenario(scenario, &answer, &self.options, grids)?;
-            self.solved_case(case, theta, at)
+            self.solved_case(case, theta, at, grids)
         };
         self.assemble_point(theta, follow)
     }
@@ -508,7 +517,9 @@ impl<'a> FitModel<'a> {
                 let Some(at) = known.equilibrium.on_coarsest_grids(count) else {
                     break;
                 };
-                let found = self.solved_case(case, &accurate.theta, at).map_err(lost)?;
+                let found = self
+                    .solved_case(case, &accurate.theta, at, GridPolicy::These)
+                    .map_err(lost)?;
                 let mut both = found.scalar_data.iter().zip(&known.scalar_data);
                 if both.all(|(a, b)| {
                     (a.model - b.model).abs() < INSIGNIFICANT_PREDICTION_ERROR * sd(b)
@@ -516,7 +527,8 @@ impl<'a> FitModel<'a> {
                     return Ok(found);
                 }
             }
-            self.solved_case(case, &accurate.theta, known.equilibrium.without_estimates())
+            let all = known.equilibrium.without_estimates();
+            self.solved_case(case, &accurate.theta, all, GridPolicy::These)
                 .map_err(lost)
         };
         let point = self.assemble_point(&accurate.theta, coarse)?;

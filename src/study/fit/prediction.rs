@@ -13,6 +13,7 @@ use crate::relax::accuracy::transfer::weights;
 use crate::relax::{
     ContinuationFailure, GridLevel, Linearized, NestedEquilibrium, Stencil, small_motion_pairs,
 };
+use crate::run::Limit;
 use crate::scenario::{Photo, PhotoParameterDerivative};
 use crate::study::fit::columns::{
     COORDINATE_COLUMNS, DatumDimension, FIRST_PHOTO_COORDINATE, MeasuredQuantity,
@@ -84,61 +85,156 @@ fn vibrating_grids(at: &NestedEquilibrium) -> impl Iterator<Item = &GridLevel> {
     levels.take_while(small).map(|(_, level)| level)
 }
 
+/// How accurate frequencies of a model are.
+#[derive(Clone, Copy)]
+pub(super) enum FrequencyAccuracy<'a> {
+    /// As the grids have it on which the leaf rests.
+    OnTheseGrids,
+    /// On as many grids as this tolerance of the leaf, and the deviations of the data, need.
+    Within { tolerance: f64, limit: &'a Limit },
+}
+
+/// Largest relative error of a frequency, over the tolerance of the leaf and in itself, and as a part of the relative
+/// standard deviation of the datum. The tolerance itself is accurate enough.
+struct FrequencyErrors {
+    over_tolerance: f64,
+    largest: f64,
+    of_deviation: f64,
+}
+
+/// The first two are those of frequencies that `relax` lists.
+const FREQUENCY_ERRORS: FrequencyErrors = FrequencyErrors {
+    over_tolerance: 40.0,
+    largest: 4e-5,
+    of_deviation: 0.1,
+};
+
+impl FrequencyErrors {
+    /// The largest relative error of the frequencies that are compared with these data.
+    fn allowed(&self, of: &ExperimentCase, tolerance: f64) -> f64 {
+        let deviation = of.measured_values().filter_map(|measured| {
+            let MeasuredQuantity::Frequency(_) = measured.quantity else {
+                return None;
+            };
+            Some(self.of_deviation * measured.sd? / measured.value?.abs())
+        });
+        let listed = (self.over_tolerance * tolerance).min(self.largest);
+        deviation.fold(listed, f64::min).max(tolerance)
+    }
+}
+
 fn lost_frequencies() -> ContinuationFailure {
     ContinuationFailure::NotAtRest("its frequencies cannot be found".into())
 }
 
-/// So many modes on each of these grids; none if none are asked for.
-fn modes_on_grids(
-    at: &NestedEquilibrium,
-    count: usize,
-) -> Result<Vec<Vec<modes::Eigenpair>>, ContinuationFailure> {
-    let on = |level: &GridLevel| {
-        let pairs = modes::unsoftened_modes(&level.leaf, &level.state, count);
-        let pairs = pairs.filter(|pairs| pairs.len() == count);
-        pairs.ok_or_else(lost_frequencies)
-    };
-    match count {
-        0 => Ok(Vec::new()),
-        _ => vibrating_grids(at).map(on).collect(),
+impl Vibrations {
+    /// So many modes or small motions on the grids of a leaf.
+    fn on_grids(at: &NestedEquilibrium, count: usize) -> Result<Self, ContinuationFailure> {
+        let mut found = match at.levels.iter().all(|it| it.leaf.leaf.has_potential()) {
+            true => Vibrations::Modes(Vec::new()),
+            false => Vibrations::Motions(Vec::new()),
+        };
+        if count > 0 {
+            for level in vibrating_grids(at) {
+                found.add_grid(level, count)?;
+            }
+        }
+        Ok(found)
+    }
+
+    /// Adds so many modes or small motions on the next grid.
+    fn add_grid(&mut self, level: &GridLevel, count: usize) -> Result<(), ContinuationFailure> {
+        match self {
+            Vibrations::Modes(grids) => {
+                let pairs = modes::unsoftened_modes(&level.leaf, &level.state, count);
+                let pairs = pairs.filter(|pairs| pairs.len() == count);
+                grids.push(pairs.ok_or_else(lost_frequencies)?);
+            }
+            Vibrations::Motions(grids) => {
+                let pairs = small_motion_pairs(level, count).filter(|pairs| pairs.len() == count);
+                grids.push(pairs.ok_or_else(lost_frequencies)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// The frequency of a mode on a grid; the square root of its size where the leaf is unstable.
+    fn frequency(&self, grid: usize, mode: usize) -> f64 {
+        match self {
+            Vibrations::Modes(grids) => grids[grid][mode - 1].eigenvalue.abs().sqrt(),
+            Vibrations::Motions(grids) => grids[grid][mode - 1].root.im,
+        }
+    }
+
+    /// Whether the frequencies of all these modes, extrapolated over these grids, are as accurate: the extrapolated
+    /// value without the finest grid is no farther from it.
+    fn are_accurate(&self, segments: &[usize], modes: &[usize], allowed: f64) -> bool {
+        let extrapolated = |mode: usize, grids: usize| {
+            let weights = weights(&segments[..grids], f64::INFINITY);
+            let terms = weights.iter().enumerate();
+            terms
+                .map(|(grid, weight)| weight * self.frequency(grid, mode))
+                .sum::<f64>()
+        };
+        let grids = self.grids();
+        grids > 1
+            && modes.iter().all(|&mode| {
+                let [before, all] = [grids - 1, grids].map(|grids| extrapolated(mode, grids));
+                (before - all).abs() <= allowed * all.abs()
+            })
     }
 }
 
-/// So many small motions on each of these grids; none if none are asked for.
-fn motions_on_grids(
-    at: &NestedEquilibrium,
-    count: usize,
-) -> Result<Vec<Vec<MotionPair>>, ContinuationFailure> {
-    let on = |level: &GridLevel| {
-        let pairs = small_motion_pairs(level, count).filter(|pairs| pairs.len() == count);
-        pairs.ok_or_else(lost_frequencies)
+/// A leaf at rest with its vibrations on grids that are fine enough for these.
+fn vibrating_leaf(
+    of: &ExperimentCase,
+    mut at: NestedEquilibrium,
+    accuracy: FrequencyAccuracy,
+) -> Result<(NestedEquilibrium, Vibrations), ContinuationFailure> {
+    let modes = of
+        .measured_values()
+        .filter_map(|measured| match measured.quantity {
+            MeasuredQuantity::Frequency(mode) => Some(mode),
+            _ => None,
+        });
+    let modes: Vec<usize> = modes.collect();
+    let count = modes.iter().copied().max().unwrap_or(0);
+    let mut vibrations = Vibrations::on_grids(&at, count)?;
+    let FrequencyAccuracy::Within { tolerance, limit } = accuracy else {
+        return Ok((at, vibrations));
     };
-    match count {
-        0 => Ok(Vec::new()),
-        _ => vibrating_grids(at).map(on).collect(),
+    let allowed = FREQUENCY_ERRORS.allowed(of, tolerance);
+    while count > 0 && vibrations.grids() == at.levels.len() {
+        let segments: Vec<usize> = at.levels.iter().map(|it| it.leaf.segments()).collect();
+        if vibrations.are_accurate(&segments, &modes, allowed) {
+            break;
+        }
+        let unknowns = |level: &GridLevel| 6 * level.leaf.rods() * level.leaf.segments();
+        let finest = at.levels.last().map_or(0, unknowns);
+        if 2 * finest >= MOST_UNKNOWNS_FOR_MODES {
+            break;
+        }
+        let Some(finer) = at.level_on_next_grid(limit) else {
+            break;
+        };
+        vibrations.add_grid(&finer, count)?;
+        let levels = at.levels.iter().cloned().chain([finer]).collect();
+        at = at.without_estimates().with_levels(levels);
     }
+    Ok((at, vibrations))
 }
 
 /// Largest number of unknowns of a grid on which modes are computed, except the first.
 const MOST_UNKNOWNS_FOR_MODES: usize = 4_000;
 
 impl CaseSolution {
-    /// Predictions of a leaf at rest for the data under these conditions.
+    /// Predictions of a leaf at rest for the data under these conditions: on more grids where frequencies need these.
     pub fn new(
         of: &ExperimentCase,
         at: NestedEquilibrium,
+        accuracy: FrequencyAccuracy,
     ) -> Result<CaseSolution, ContinuationFailure> {
-        let frequencies = of
-            .measured_values()
-            .filter_map(|measured| match measured.quantity {
-                MeasuredQuantity::Frequency(mode) => Some(mode),
-                _ => None,
-            });
-        let count = frequencies.max().unwrap_or(0);
-        let vibrations = match at.levels.iter().all(|it| it.leaf.leaf.has_potential()) {
-            true => Vibrations::Modes(modes_on_grids(&at, count)?),
-            false => Vibrations::Motions(motions_on_grids(&at, count)?),
-        };
+        let (at, vibrations) = vibrating_leaf(of, at, accuracy)?;
         for measured in of.measured_values() {
             if let MeasuredQuantity::Frequency(mode) = measured.quantity {
                 vibrations.check_frequency(mode)?;
