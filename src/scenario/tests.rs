@@ -232,7 +232,6 @@ fn what_cannot_be_is_refused() {
         grip[0].at=[0.5, 0.6, 0.7] => has 3 entries: must have 2
         grip[1].vein=1; grip[1].at=0.5 => grip[1].at = 0.5: is held by grip[0], too
         grip[1].vein=1; grip[1].at=[0.2, 0.3] => grip[0].at = [0.3, 0.7]: is held by grip[1], too
-        grip[0].held=pinned; stiffness.axial=inf; stiffness.shear_2=10 => holds every place of a stretch that shears and is inextensible
         grip[0].held=glued => must be "pinned" (the position is held) or "clamped"
         grip[0].move=[30, 0, 0] => must be at most 10 times the longest rod
         leaf.joined=true; grip[1].at=1.0 => must end before 1: the tip is shared by several rods, or held
@@ -286,6 +285,35 @@ fn what_cannot_be_is_refused() {
 }
 
 /// In files, where a line is named.
+/// Where every place of a vein is held a section that cannot stretch cannot shear, whatever the force along it is.
+#[test]
+fn places_of_a_stretch_do_not_hold_what_shears_and_does_not_stretch() {
+    let read = |[axial, shear, held, at]: [&str; 4]| {
+        let text = format!(
+            "name = \"held\"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0] }}
+            stiffness = {{ torsion = 1.0, bending_2 = 1.0, bending_3 = 1.0, axial = {axial}, shear_2 = {shear}, shear_3 = inf }}
+            load = {{ gravity = [0.0, 0.0, -1.0] }}
+            grip = [{{ vein = 1, at = {at}, held = \"{held}\" }}]"
+        );
+        Scenario::from_toml(&text).map_err(|refused| refused.to_string())
+    };
+    let stretch = "[0.3, 0.7]";
+    let refused = read(["inf", "50.0", "pinned", stretch]).unwrap_err();
+    assert!(
+        refused.contains("stretch that shears and is inextensible"),
+        "{refused}"
+    );
+    for held in [
+        ["1e3", "50.0", "pinned", stretch],
+        ["inf", "inf", "pinned", stretch],
+        ["inf", "50.0", "clamped", stretch],
+        ["inf", "50.0", "pinned", "0.5"],
+    ] {
+        assert!(read(held).is_ok(), "{held:?}");
+    }
+}
+
 #[test]
 fn tables_that_are_not_as_they_should_be_are_refused() {
     let table = r#"

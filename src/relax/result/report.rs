@@ -405,8 +405,7 @@ fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
             let sigma = leaf.grid.sigma()[held.node];
             (SpanHolder::Grip(sigma), held.node, held.position)
         });
-        let tip = leaf.leaf.tip_support.as_ref();
-        let tip = tip.map(|held| (SpanHolder::Tip, n, held.position));
+        let tip = (leaf.leaf.tip_support.iter()).map(|it| (SpanHolder::Tip, n, it.position));
         base.into_iter().chain(grips).chain(tip).collect::<Vec<_>>()
     };
     let taut = |j: usize, from: usize, to: usize, distance: f64| {
