@@ -177,6 +177,7 @@ pub fn lowest(
             tolerance,
             wanted_relative_error: wanted,
             rounding: 0.0,
+            imbalance: 0.0,
             turns: !finest.leaf.zero_energy_fields(&finest.state).is_empty(),
         },
         finest: None,
@@ -276,6 +277,7 @@ impl<'a> NestedEigenvalues<'a> {
         self.series.push(&pairs);
         self.segments.push(level.leaf.segments());
         self.series.rounding = modes::quotient_rounding(&level.leaf);
+        self.series.imbalance = level.leaf.segments() as f64 * level.leaf.residual(&level.state);
         let before = self.finest.replace(GridModes { level, pairs });
         self.coarser = before.map(|before| before.level);
         true
@@ -501,6 +503,9 @@ struct EigenvalueSeries {
     wanted_relative_error: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     rounding: f64,
+    /// Relative error of an eigenvalue there by what is not in balance in the leaf: unbalanced nodal forces change those
+    /// in the segments, with which the leaf is stiffer or softer.
+    imbalance: f64,
     /// Whether the leaf can turn without resistance: an eigenvalue within rounding of zero is then no
     /// doubt.
     turns: bool,
@@ -575,7 +580,7 @@ impl EigenvalueSeries {
                 // Zero on all grids is that of a turn without resistance, and exact.
                 error: it.error.map(|error| match it.value == 0.0 {
                     true => 0.0,
-                    false => bound(error) * unit + self.rounding,
+                    false => (bound(error) + self.imbalance) * unit + self.rounding,
                 }),
                 number,
             }
@@ -588,7 +593,7 @@ impl EigenvalueSeries {
     /// Whether the relative error of all frequencies is as small as wanted.
     fn accurate(&self) -> bool {
         let known = |(k, it): (usize, ExtrapolatedEigenvalue)| {
-            let wanted = 2.0 * self.wanted_relative_error * self.unit(k);
+            let wanted = (2.0 * self.wanted_relative_error + self.imbalance) * self.unit(k);
             it.error
                 .is_some_and(|error| error <= wanted + self.rounding)
         };
@@ -697,6 +702,7 @@ mod tests {
             tolerance: 1e-6,
             wanted_relative_error: 1e-6,
             rounding: 8e-6,
+            imbalance: 0.0,
             turns: false,
         };
         assert_eq!(found.negative_count(), None);
@@ -730,6 +736,7 @@ mod tests {
                 tolerance: 1e-6,
                 wanted_relative_error: 4e-5,
                 rounding: 0.0,
+                imbalance: 0.0,
                 turns: false,
             };
             assert_eq!(found.accurate(), grids == clean);

@@ -491,12 +491,12 @@ pub fn smooth_curve(points: &[DVec2]) -> Vec<Vec<DVec2>> {
     };
     (0..chords.len())
         .map(|k| {
-            // A long chord does not swing out by the slope of a short one beside it.
+            // A long chord does not swing out by the slope of a short one beside it, nor where it begins or ends a curve.
             let beside = [k.checked_sub(1), Some(k + 1).filter(|k| *k < chords.len())];
-            let [from, to] = [0, 1].map(|end| {
-                let most = beside[end].map_or(f64::INFINITY, |k| LONGEST_SWING * length(k));
-                length(k).min(most) * tangents(k)[end]
-            });
+            let most = beside.map(|k| k.map(|k| LONGEST_SWING * length(k)));
+            let most = [most[0].or(most[1]), most[1].or(most[0])];
+            let [from, to] = [0, 1]
+                .map(|end| length(k).min(most[end].unwrap_or(f64::INFINITY)) * tangents(k)[end]);
             let (a, b) = (points[k], points[k + 1]);
             let count =
                 ((length(k) / PIECE_LENGTH).ceil() as usize).clamp(1, MOST_PIECES_BETWEEN_POINTS);

@@ -80,7 +80,7 @@ tip_force = [0.1, 0.2, -0.3]
     TestLeaf {
         name: "mixed",
         text: "
-leaf = { rods = 3, length = 1.0, fan = \"symmetric\", base_held = [\"elastic\", \"clamped\", \"pinned\"], base_turn_stiffness = [2.0, 0.0, 0.0] }
+leaf = { rods = 3, length = 1.0, fan = \"symmetric\", base_held = [\"elastic\", \"clamped\", \"pinned\"], base_turn_stiffness = [2.0, 0.0, 2.0] }
 coupling = { x = 1.0, y = 2.0, z = 1.5 }
 [load]
 gravity = [0.1, 0.2, -0.6]
