@@ -569,14 +569,14 @@ mod tests {
         );
     }
 
-    /// A flat chord of 100 beside a steep one of 10 swings out by a few.
+    /// A flat chord of 100 beside a steep one of 10 swings out by a few, and not by 22.
     #[test]
     fn uneven_points_do_not_swing_out() {
         let points =
             [[0.0, 0.0], [100.0, 0.0], [101.0, 10.0], [101.5, 30.0]].map(DVec2::from_array);
         let drawn = smooth_curve(&points);
         let lowest = drawn.iter().flatten().map(|it| it.y).fold(0.0, f64::min);
-        assert!(lowest > -4.0, "{lowest}");
+        assert!(lowest > -6.0, "{lowest}");
     }
 
     #[test]
