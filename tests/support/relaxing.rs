@@ -110,7 +110,7 @@ pub fn reduced_and_full(scenario: &Scenario, segments: Option<usize>) -> [Equili
     [options(), in_full(options())].map(|options| relaxed(scenario, &options))
 }
 
-/// A scenario file with [`entries`] replaced, relaxed at the tight tolerance.
+/// A scenario file with `entries` replaced, relaxed at the tight tolerance.
 #[track_caller]
 pub fn solve(name: &str, overrides: &str) -> Equilibrium {
     settle(&scenario(name, overrides), TIGHT)

@@ -81,7 +81,7 @@ pub struct Both {
 }
 
 impl Both {
-    /// A scenario file with [`entries`] replaced.
+    /// A scenario file with `entries` replaced.
     #[track_caller]
     pub fn solve(name: &str, overrides: &str) -> Both {
         Both::of(&scenario(name, overrides))
