@@ -10,9 +10,10 @@ use crate::branch::family::{
     CompletedIncrements, OutOfRange, force_parameter_derivative, place_supports, unbalanced_forces,
 };
 use crate::branch::points::{
-    BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, dot, increments_between,
+    BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, increments_between,
     inject_forces, is_finite, largest, scale_field, scaled_sum,
 };
+use crate::leaf::dot;
 use crate::leaf::{DiscreteLeaf, LinearSolveOutcome, MatrixFactors, NodalField, State, System};
 use crate::newton::ForceConvergence;
 use crate::numbers::larger;

@@ -9,9 +9,10 @@
 use crate::branch::equations::{BorderedLinearization, BranchEquations, CorrectorFailure};
 use crate::branch::family::eigenvalue_rounding;
 use crate::branch::points::{
-    BranchDirection, EquilibriumPoint, add_scaled, combine_fields, dot, increments_between,
-    scale_field, scaled_sum,
+    BranchDirection, EquilibriumPoint, add_scaled, combine_fields, increments_between, scale_field,
+    scaled_sum,
 };
+use crate::leaf::dot;
 use crate::leaf::{NodalField, State};
 use crate::numbers::larger;
 

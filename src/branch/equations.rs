@@ -9,9 +9,10 @@ use crate::branch::family::{
     place_supports, state_after_step, stiffest_condensed, unbalanced_forces,
 };
 use crate::branch::points::{
-    BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, combine_fields, dot,
-    is_finite, largest, prolong_field, scale_field, scaled_sum,
+    BranchDirection, EquilibriumPoint, ParametrizedState, add_scaled, combine_fields, is_finite,
+    largest, prolong_field, scale_field, scaled_sum,
 };
+use crate::leaf::dot;
 use crate::leaf::{
     BorderedSolution, DirectError, DirectSolver, Grid, MatrixFactors, NodalField, State, System,
 };

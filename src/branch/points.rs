@@ -65,15 +65,6 @@ impl<const N: usize> BranchDirection<N> {
     }
 }
 
-/// The work of forces (and torques) on increments of the nodes, both by rod, node and component.
-pub fn dot(forces: &NodalField, increments: &NodalField) -> f64 {
-    let mut sum = 0.0;
-    for (f, d) in forces.iter().flatten().zip(increments.iter().flatten()) {
-        sum += (0..6).map(|c| f[c] * d[c]).sum::<f64>();
-    }
-    sum
-}
-
 /// a + factor b.
 pub fn scaled_sum(a: &NodalField, factor: f64, b: &NodalField) -> NodalField {
     let mut sum = a.clone();

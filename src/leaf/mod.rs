@@ -48,7 +48,7 @@ pub use crate::leaf::rod_ode::{FieldChange, RodFields, RodIntegrator, StationFie
 pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::springs::SpringEnd;
 pub use crate::leaf::state::{
-    Increment, NodalField, State, add_to_increment, displacement_part, rotation_part,
+    Increment, NodalField, State, add_to_increment, displacement_part, dot, rotation_part,
 };
 pub use crate::leaf::supports::NodeFreedom;
 pub use crate::leaf::system::{

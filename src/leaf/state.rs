@@ -50,6 +50,15 @@ impl NodeIncrement {
 /// last displacement is the same in every rod, and the last force is each rod's share.
 pub type NodalField = Vec<Vec<Increment>>;
 
+/// The work of forces (and torques) on increments of the nodes, both by rod, node and component.
+pub fn dot(forces: &NodalField, increments: &NodalField) -> f64 {
+    let mut sum = 0.0;
+    for (f, d) in forces.iter().flatten().zip(increments.iter().flatten()) {
+        sum += (0..6).map(|c| f[c] * d[c]).sum::<f64>();
+    }
+    sum
+}
+
 /// The rotation part of an increment.
 #[inline]
 pub fn rotation_part(increment: &Increment) -> DVec3 {

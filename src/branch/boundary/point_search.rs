@@ -10,10 +10,11 @@ use crate::branch::family::{
     LeafFamily, OutOfRange, force_parameter_derivative, unbalanced_forces,
 };
 use crate::branch::points::{
-    add_scaled, combine_fields, dot, increments_between, scale_field, scaled_sum,
+    add_scaled, combine_fields, increments_between, scale_field, scaled_sum,
 };
 use crate::branch::{equations, points};
 use crate::leaf::NodalField;
+use crate::leaf::dot;
 use crate::newton::{Contraction, RequiredAccuracy, remaining_error};
 use crate::numbers::largest;
 use nalgebra::DMatrix;

@@ -12,8 +12,9 @@ use crate::branch::convergence::ExtrapolatedPoint;
 use crate::branch::critical::{CriticalKind, CriticalPoint};
 use crate::branch::equations::{CorrectorFailure, STIFF};
 use crate::branch::points::{
-    add_scaled, combine_fields, dot, prolong_field, restrict_field, scale_field, scaled_sum,
+    add_scaled, combine_fields, prolong_field, restrict_field, scale_field, scaled_sum,
 };
+use crate::leaf::dot;
 use crate::leaf::{Grid, NodalField, State};
 use crate::numbers::larger;
 use crate::relax::accuracy::transfer::{prolong, restrict};

@@ -8,7 +8,7 @@
 //! is Newton's method.
 
 use crate::homotopy::{StepEnd, StepSizes};
-use crate::leaf::{BucklingMode, NodalField, State};
+use crate::leaf::{BucklingMode, NodalField, State, dot};
 use crate::newton::{EquilibriumFailure, NewtonEquations, NewtonIteration, is_at_saddle};
 use crate::relax::loading::{LoadPath, LoadStepOutcome, PathState};
 use crate::relax::path::StabilityLoss;
@@ -91,18 +91,12 @@ const LEAST_IMPERFECTION: f64 = 1e-6;
 fn imperfection(before: &State, behind: &State, mode: &NodalField, first: usize) -> f64 {
     let mut way = NodalField::new();
     behind.increments_to(before, first, &mut way);
-    let product = |a: &NodalField, b: &NodalField| -> f64 {
-        let a = a.iter().flatten().flatten();
-        a.zip(b.iter().flatten().flatten())
-            .map(|(a, b)| a * b)
-            .sum()
-    };
     let largest = mode
         .iter()
         .flatten()
         .flatten()
         .fold(0.0_f64, |m, it| m.max(it.abs()));
-    largest * product(&way, mode) / product(mode, mode)
+    largest * dot(&way, mode) / dot(mode, mode)
 }
 
 impl LoadPath<'_> {
