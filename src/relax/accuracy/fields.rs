@@ -352,7 +352,7 @@ fn weighted_mean_section([a, b]: [&LeafSection; 2], weight: impl Fn(usize) -> f6
 
 /// A kink that is closer to a station than this, as a fraction of the length, is there: nodes of grids are within rounding
 /// of kinks. A load on a point jumps there once, and not at the station and at the kink.
-const SAME_PLACE_DISTANCE: f64 = 1e-12;
+const KINK_ROUNDING: f64 = 1e-12;
 
 /// The sections at `points`, one after the other, integrated from one section; no step reaches
 /// across a kink.
@@ -366,7 +366,7 @@ fn integrate_from_section(
     let mut integrate_to = |point: f64| {
         let inside = |kink: &&f64| {
             let apart = [at, point].map(|end| **kink - end);
-            apart[0] * apart[1] < 0.0 && apart.iter().all(|it| it.abs() > SAME_PLACE_DISTANCE)
+            apart[0] * apart[1] < 0.0 && apart.iter().all(|it| it.abs() > KINK_ROUNDING)
         };
         let mut stops: Vec<f64> = kinks.iter().filter(inside).copied().collect();
         if point < at {
