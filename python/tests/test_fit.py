@@ -117,9 +117,9 @@ def test_what_the_data_do_not_say() -> None:
 @pytest.mark.parametrize(
     "data, free, part",
     [
-        ({"tip_x": [1.0, np.inf]}, AXIAL, "data:3: tip_x = inf: must be a finite number"),
-        ({"tip_w": [1.0]}, AXIAL, "unknown column tip_w"),
-        ([{"tip_x": [1.0]}, {"rod": [9], "x": 1.0, "y": 1.0}], AXIAL, "data\\[1\\]:2: rod = 9: must be a whole number from 1 to 5"),
+        ({"tip_x": [1.0, np.inf]}, AXIAL, "data, row 1 \\(counted from 0\\): tip_x = inf: must be a finite number"),
+        ({"tip_w": [1.0]}, AXIAL, "^data: unknown column tip_w: .* by the argument columns, as in {'tip_w': 'tip_x'}"),
+        ([{"tip_x": [1.0]}, {"rod": [9], "x": 1.0, "y": 1.0}], AXIAL, "data\\[1\\], row 0 .*: rod = 9: must be a whole number from 1 to 5"),
         ({"tip_x": [1.0, 2.0], "tip_y": [1.0, 2.0, 3.0]}, AXIAL, "tip_x has 2 rows, and others have 3"),
         ({"tip_x": [[1.0, 2.0]]}, AXIAL, "data: tip_x: a column is a list of numbers"),
         ({"tip_x": [True]}, AXIAL, "data: tip_x = True: must be a number"),

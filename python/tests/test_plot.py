@@ -221,6 +221,36 @@ def test_a_fit_draws_all_that_was_measured() -> None:
     assert ax.lines[1].get_ydata() == pytest.approx(points["z"], abs=1e-4)
 
 
+def test_where_other_loads_vary_along_the_fit_is_points() -> None:
+    """A curve is drawn over a number with which others vary in step, or not at all."""
+    rod = {**column(), "load": {"tip_force": [0.0, 0.0, 0.0]}}
+    across = [0.1, 0.2, 0.3, 0.4, 0.5]
+    for along, is_curve in [([0.2, 0.4, 0.6, 0.8, 1.0], True), ([0.1, 0.9, 0.3, 0.2, 0.5], False)]:
+        loads = {"load.tip_force[2]": across, "load.tip_force[1]": along}
+        rows = [dict(zip(loads, row)) for row in zip(*loads.values())]
+        tips = [leafdyn.relax(rod, set=row).tip[2] for row in rows]
+        fit = leafdyn.fit(rod, {**loads, "tip_z": tips, "sd_tip_z": 1e-3}, "stiffness.bending_2")
+        ax = fit.plot(against="load.tip_force[2]")
+        curves = [line for line in ax.lines if len(line.get_xdata()) > len(across)]
+        assert bool(curves) == is_curve
+        if not is_curve:
+            drawn = ax.containers[1].lines[0]
+            assert drawn.get_linestyle() in ("None", "none", "")
+            assert drawn.get_xdata().tolist() == across
+            assert drawn.get_ydata() == pytest.approx(tips, abs=1e-4)
+
+
+def test_a_profile_is_drawn() -> None:
+    pull = {"load.tip_force[0]": [4, 8, 12, 16, 20], "tip_x": [0.9707, 0.9898, 1.0090, 1.0239, 1.0399]}
+    scenario = leafdyn.Scenario("scenarios/measured/pull.toml", {"stiffness.shear_2": 40, "stiffness.shear_3": 50})
+    profile = leafdyn.fit(scenario, pull, "stiffness.axial").profile("stiffness.axial")
+    ax = profile.plot(label="pulled")
+    curve, height = ax.lines
+    assert curve.get_xydata().T.tolist() == [profile.values.tolist(), profile.chi_squared.tolist()]
+    assert list(height.get_ydata()) == pytest.approx([profile.chi_squared.min() + 3.84] * 2)
+    assert (ax.get_xlabel(), ax.get_ylabel(), curve.get_label()) == ("stiffness.axial", "chi squared", "pulled")
+
+
 def test_maps_and_charts_are_drawn() -> None:
     found = leafdyn.stability_map(fan(2), {"load.gravity[2]": (-1, -2, 2)}, methods=["semi-implicit", "shooting"])
     ax = found.plot()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,8 +13,10 @@ from . import _leafdyn
 from ._arguments import texts
 from ._attribute import Attribute, computed
 from ._data import column_unit, column_variables, dataset, pandas
-from ._draw import stacked, written
+from ._draw import axes, labelled, stacked, written
+from ._errors import ScenarioError
 from ._leaf import Array
+from ._measured import of_columns
 from ._predict import Measurement, Prediction, draw, predicted, series
 from ._progress import Heard
 from ._result import Contents, Table, read_only
@@ -102,7 +104,12 @@ class Asked:
     def files(self, heard: Heard | None = None, candidates: Any = None) -> Contents:
         """The fit, as the program writes it."""
         core, chosen = self.scenario._core, (self.maps, self.every, self.rows)
-        return _leafdyn.fit(core, self.tables, self.keys, self.robust, candidates, *chosen, self.tolerance, heard)
+        try:
+            return _leafdyn.fit(core, self.tables, self.keys, self.robust, candidates, *chosen, self.tolerance, heard)
+        except ValueError as refused:
+            if isinstance(refused, ScenarioError):
+                raise
+            raise ValueError(of_columns(str(refused))) from None
 
     def held(self, key: str, value: float, every: list[str]) -> Asked:
         """The same with one of its free numbers held at a value."""
@@ -140,14 +147,40 @@ class LikelihoodProfile:
     key: str
     values: Array
     chi_squared: Array
+    _units: Mapping[str, str] = field(default_factory=dict, repr=False)
 
     def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each value."""
         return pandas().DataFrame({self.key: self.values, "chi_squared": self.chi_squared})
 
+    def plot(self, ax: Any = None, **style: Any) -> Any:
+        """Draw the sum of squares over the number with matplotlib, and the height of 3.84 over its minimum.
+
+        Parameters
+        ----------
+        ax
+            Where; left out: axes in a new figure.
+        **style
+            Of the line, as ``color`` and ``label``.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        ax = axes(ax)
+        order = np.argsort(self.values)
+        (line,) = ax.plot(self.values[order], self.chi_squared[order], **{"marker": "o", **style})
+        if len(order):
+            ax.axhline(self.chi_squared.min() + QUANTILE, color=line.get_color(), linestyle=":", linewidth=1)
+        ax.set(xlabel=labelled(self.key, column_unit(self._units, self.key)), ylabel="chi squared")
+        return ax
+
     def __repr__(self) -> str:
         return f"<LikelihoodProfile of {self.key}: {len(self.values)} values>"
 
+
+QUANTILE = 3.84
+"""By how much the sum of squares exceeds its minimum at the ends of a 95 % interval: of one degree of freedom."""
 
 TOLD = 4
 """Numbers that a fit shows."""
@@ -292,7 +325,7 @@ class Fit(Table):
         Returns
         -------
         LikelihoodProfile
-            With ``values`` and ``chi_squared``.
+            With ``values`` and ``chi_squared``; ``plot()`` draws it.
 
         Raises
         ------
@@ -331,7 +364,7 @@ class Fit(Table):
         for value in held:
             columns = Fit(self._asked.held(key, float(value), list(self.parameters)).files()).columns
             sums.append(float(np.sum(((columns["data"] - columns["model"]) / sd) ** 2)))
-        return LikelihoodProfile(key, held, np.array(sums))
+        return LikelihoodProfile(key, held, np.array(sums), self._units)
 
     def predict(self, conditions: Source | Mapping[str, Any], what: str | Iterable[str] | None = None) -> Prediction:
         """What the fitted leaf does under other conditions, with 95 % bands.
@@ -404,8 +437,9 @@ class Fit(Table):
             What was measured, as ``"tip_x"``; left out: all that was measured, in axes of its own each, or in `ax` what
             was measured most often.
         against
-            The key that varied; left out: that with most values. Numbers that varied in step with it are interpolated;
-            experiments that differ in others, too, have curves of their own.
+            The key that varied; left out: that with most values. A curve is drawn where all other numbers are the same or
+            varied in step with it, by a straight line; where others vary along, the fitted leaf is drawn at the
+            measurements alone. Experiments at the same value that differ in others stand apart.
 
         Returns
         -------

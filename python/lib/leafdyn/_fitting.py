@@ -78,7 +78,8 @@ def fit(
     FileNotFoundError
         If the path of a table, or of the scenario, is not there.
     ValueError
-        If the data or the free numbers cannot be used: it says what to change. The first row of columns is line 2.
+        If the data or the free numbers cannot be used: it says what to change. Rows of columns are counted from 0, and
+        lines of files from 1.
 
     Warns
     -----

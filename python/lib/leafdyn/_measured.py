@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 from collections.abc import Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, Protocol, TypeAlias, Union
@@ -38,6 +39,26 @@ def measurements(
     if isinstance(one, (str, os.PathLike)) or hasattr(one, "items") or not isinstance(one, Iterable):
         return [_table(one, name, units)]
     return [_table(table, f"{name}[{number}]", units) for number, table in enumerate(one)]
+
+
+def of_columns(message: str) -> str:
+    """A message about measurements as Python has these: rows are those of columns, and options are arguments.
+
+    >>> of_columns("data[1]:3: tip_x = inf: must be a finite number")
+    'data[1], row 1 (counted from 0): tip_x = inf: must be a finite number'
+    >>> of_columns("data:1: unknown column F: say what it is by the option column, as in 'F=tip_x'")
+    "data: unknown column F: say what it is by the argument columns, as in {'F': 'tip_x'}"
+    """
+
+    def row(found: re.Match[str]) -> str:
+        # The first line has the names of the columns.
+        number = int(found["line"]) - 2
+        return f"{found['table']}: " if number < 0 else f"{found['table']}, row {number} (counted from 0): "
+
+    said = re.sub(r"^(?P<table>(?:data|candidates)(?:\[\d+\])?):(?P<line>\d+): ", row, message)
+    said = said.replace("name it so in the file, or say", "name it so, or say")
+    said = re.sub(r"by the option column, as in '([^']+)=([^'=]+)'", r"by the argument columns, as in {'\1': '\2'}", said)
+    return re.sub(r"^column (?=[^:]+=)", "columns: ", said)
 
 
 def _table(table: Any, name: str, units: Mapping[str, str]) -> tuple[str, str] | str:

@@ -130,7 +130,9 @@ class Series:
     data: Array
     sd: Array
     conditions: dict[str, Array]
-    """All that is set, by keys, along a curve through it: numbers that vary in step with the first are interpolated."""
+    """All that is set, by keys: along a curve through it where all other numbers vary in step with the first, else at the
+    measurements alone."""
+    is_curve: bool
 
 
 Measurement = tuple[Mapping[str, float], float, float]
@@ -157,9 +159,21 @@ def series(measured: Sequence[Measurement], against: str) -> list[Series]:
 def _series(points: Sequence[Measurement], against: str, apart: Sequence[str]) -> Series:
     across, data, sd = np.array([(here[against], datum, sd) for here, datum, sd in points]).T
     first = points[0][0]
-    curve = np.linspace(across[0], across[-1], CURVE)
-    conditions = {key: np.interp(curve, across, [here[key] for here, _, _ in points]) for key in first}
-    return Series({key: first[key] for key in apart if key in first}, across, data, sd, conditions)
+    others = {key: np.array([here[key] for here, _, _ in points]) for key in first}
+    is_curve = all(_in_step(across, other) for other in others.values())
+    curve = np.linspace(across[0], across[-1], CURVE) if is_curve else across
+    conditions = {key: np.interp(curve, across, other) if is_curve else other for key, other in others.items()}
+    return Series({key: first[key] for key in apart if key in first}, across, data, sd, conditions, is_curve)
+
+
+def _in_step(across: Array, other: Array) -> bool:
+    """Whether a number is a linear function of another: between the measurements it is then known, too."""
+    straight = np.interp(across, across[[0, -1]], other[[0, -1]])
+    return bool(np.abs(other - straight).max() <= IN_STEP * np.abs(other).max())
+
+
+IN_STEP = 1e-6
+"""Part of a number by which it may be off a straight line: decimals that were written down."""
 
 
 def draw(ax: Any, shown: Sequence[tuple[Series, Prediction]], names: tuple[str, str], units: Mapping[str, str]) -> None:
@@ -173,7 +187,11 @@ def draw(ax: Any, shown: Sequence[tuple[Series, Prediction]], names: tuple[str, 
         )
         across, height = measured.conditions[against], found.values[show]
         band = np.where(np.isfinite(found.bands[show]), found.bands[show], np.nan)
-        ax.plot(across, height, color=color, label=None if others else "fitted, with its 95 % band")
+        label = None if others else "fitted, with its 95 % band"
+        if not measured.is_curve:
+            ax.errorbar(across, height, band, fmt="x", color="C1" if color == "C0" else color, capsize=4, label=label)
+            continue
+        ax.plot(across, height, color=color, label=label)
         ax.fill_between(across, height - band, height + band, color=color, alpha=0.2, linewidth=0)
     labels = (against, against), (show.replace("_", " "), show)
     ax.set(
