@@ -223,6 +223,25 @@ def test_starts_that_are_refused(tmp_path: Path) -> None:
         leafdyn.relax(fan(3), start=leafdyn.load(tmp_path))  # type: ignore[arg-type]
 
 
+def test_frequencies_have_errors() -> None:
+    """As in a table of a sweep; they bound how far a cantilever's is from its closed form."""
+    pytest.importorskip("pandas")
+    leaf = leafdyn.modes(fan(2), 3)
+    assert leaf.frequency_errors is not None
+    names = [f"frequency_{k}" for k in (1, 2, 3)]
+    row = leafdyn.sweep(fan(2), {"load.gravity[2]": [-1.0]}, names).iloc[0]
+    assert leaf.frequency_errors == pytest.approx([row[f"{name}_error"] for name in names], rel=1e-9)
+    slender = {**column(), "dynamics": {"density": 1.0, "rotary_inertia": 1e-11}}
+    leaf = leafdyn.modes(slender, 1)
+    assert leaf.frequencies is not None and leaf.frequency_errors is not None
+    # Euler and Bernoulli: (beta L)^2 sqrt(B / rho) / (2 pi L^2), with cos(beta L) cosh(beta L) = -1.
+    exact = 1.8751040687119611**2 / (2 * np.pi)
+    assert abs(leaf.frequencies[0] - exact) <= leaf.frequency_errors[0] < 1e-4
+    assert leafdyn.relax(fan(2)).frequency_errors is None
+    single = leafdyn.modes(fan(2), 1, segments=8)
+    assert single.frequency_errors is not None and np.isinf(single.frequency_errors).all()
+
+
 def test_modes() -> None:
     leaf = leafdyn.modes(fan(3), 4)
     assert leaf.frequencies is not None

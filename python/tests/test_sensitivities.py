@@ -74,6 +74,60 @@ def test_they_travel() -> None:
     assert leafdyn.relax(fan(2)).sensitivities == {}
 
 
+def test_all_numbers_and_entries_of_lists() -> None:
+    leaf = leafdyn.sensitivities(fan(3), "all", set={"leaf.fan": [-0.3, 0.0, 0.4]}, modes=0)
+    stiff = [f"stiffness.{name}" for name in ("torsion", "bending_2", "bending_3", "axial", "shear_2", "shear_3")]
+    wanted = {*stiff, "leaf.length", "coupling.y", "coupling.z", *(f"load.gravity[{k}]" for k in range(3))}
+    assert set(leaf.sensitivities) >= wanted | {f"leaf.fan[{k}]" for k in range(3)}
+    assert not any(key.startswith(("leaf.rods", "solve")) for key in leaf.sensitivities)
+    alone = leafdyn.sensitivities(fan(3), "leaf.fan", set={"leaf.fan": [-0.3, 0.0, 0.4]}, modes=0)
+    assert list(alone.sensitivities) == [f"leaf.fan[{k}]" for k in range(3)]
+    for key, found in alone.sensitivities.items():
+        assert found.tip == pytest.approx(leaf.sensitivities[key].tip, abs=1e-9)
+    # By differences.
+    step = 1e-3
+    ends = [leafdyn.relax(fan(3), set={"leaf.fan": [-0.3, 0.0, 0.4 + by]}, tolerance=1e-9).tip for by in (-step, step)]
+    slope = (ends[1] - ends[0]) / (2 * step)
+    assert np.abs(slope - alone.sensitivities["leaf.fan[2]"].tip).max() < 1e-5
+    # A word has no entries.
+    with pytest.raises(ValueError, match="leaf.fan: is a list"):
+        leafdyn.sensitivities(fan(3), "leaf.fan")
+    text = leafdyn.Scenario(fan(2)).text
+    assert set(leafdyn.sensitivities(text, "all", modes=0).sensitivities) >= set(stiff)
+
+
+def test_keys_without_influence_are_named() -> None:
+    with pytest.warns(leafdyn.LeafWarning, match="^fan: no sensitivity by tip.twist, blade.least_width: "):
+        leaf = leafdyn.sensitivities(fan(2), ["tip.twist", "stiffness.torsion", "blade.least_width"])
+    assert list(leaf.sensitivities) == ["stiffness.torsion"]
+
+
+def test_they_are_a_table(tmp_path: Path) -> None:
+    pytest.importorskip("pandas")
+    held = {**fan(2), "tip": {"held": "pinned", "position": [0.9, 0.0, 0.0]}}
+    leaf = leafdyn.sensitivities(held, ["load.gravity[2]", "tip.position[0]"], modes=1)
+    table = leaf.sensitivities.to_pandas()
+    assert table.index.tolist() == list(leaf.sensitivities)
+    for key, one in leaf.sensitivities.items():
+        row = table.loc[key]
+        assert one.tip_reaction is not None
+        assert row[["tip_x", "tip_y", "tip_z"]].tolist() == one.tips[0].tolist()
+        assert row[["reaction_x", "reaction_y", "reaction_z"]].tolist() == one.tip_reaction.tolist()
+        assert row[["tip_z_error", "energy_error", "reaction_x_error"]].tolist() == [
+            *(one.tip_error, one.energy_error, one.tip_reaction_error)
+        ]
+        assert row[["value", "energy", "lowest_eigenvalue", "frequency_1"]].tolist() == [
+            *(one.value, one.energy, one.lowest_eigenvalue, one.frequencies[0])
+        ]
+    leaf.save(tmp_path)
+    again = leafdyn.load(tmp_path)
+    assert isinstance(again, leafdyn.Equilibrium)
+    assert again.sensitivities.to_pandas().equals(table)
+    assert leaf.figure("sensitivity") == leaf.figure("sensitivity.svg")
+    with pytest.raises(ValueError, match="name = 'sensitivities': must be one of .*sensitivity.svg"):
+        leaf.figure("sensitivities")
+
+
 def test_refusals() -> None:
     with pytest.raises(ValueError, match="stiffness.nonsense"):
         leafdyn.sensitivities(fan(2), "stiffness.nonsense")

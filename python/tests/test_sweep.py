@@ -1,5 +1,6 @@
 """A sweep finds what single leaves find, in the order of its grid."""
 
+import json
 import warnings
 from pathlib import Path
 from typing import Any
@@ -118,8 +119,146 @@ def test_keys_in_a_tuple_and_whole_tables() -> None:
     table = leafdyn.sweep(rod, {"section": sections}, ["tip_z", "peak_stress"])
     alone = leafdyn.sweep(rod, {"section.diameter": [0.1, 0.2]}, ["tip_z", "peak_stress"])
     assert table["tip_z"].tolist() == alone["tip_z"].tolist()
-    assert table["section"].tolist() == sections
+    assert table["section"].tolist() == ["diameter = 0.1", "diameter = 0.2"]
     assert table["peak_stress"].tolist() == alone["peak_stress"].tolist()
+
+
+ROD: dict[str, Any] = {
+    "name": "rod",
+    "leaf": {"rods": 1, "length": 1.0, "fan": [0.0]},
+    "section": {"shape": "ellipse", "width": 0.2, "thickness": 0.1, "young": 1e5, "poisson": 0.2},
+    "load": {"gravity": [0, 0, -0.1]},
+}
+CIRCLE = {"shape": "circle", "diameter": 0.1, "young": 1e5}
+
+
+def test_tables_have_labels_and_group() -> None:
+    """A table with a shape takes the place of the whole section, one without keeps the others' entries."""
+    sections = {"round": CIRCLE, "flat": ROD["section"], "thin": {"thickness": 0.05}}
+    grid = {"section": sections, "leaf.length": [0.5, 1.0]}
+    table = leafdyn.sweep(ROD, grid, "tip_z", errors=False)
+    assert table["section"].tolist() == ["round", "round", "flat", "flat", "thin", "thin"]
+    assert list(table.groupby("section")["tip_z"].min().index) == ["flat", "round", "thin"]
+    drops = table.pivot(index="section", columns="leaf.length", values="tip_z")[1.0]
+    for label, section in [("round", CIRCLE), ("thin", {**ROD["section"], "thickness": 0.05})]:
+        assert drops[label] == leafdyn.relax({**ROD, "section": section}).tip[2]
+    without = leafdyn.sweep(ROD, {**grid, "section": list(sections.values())}, "tip_z", errors=False)
+    assert without["tip_z"].tolist() == table["tip_z"].tolist()
+    assert without["section"].nunique() == 3
+    assert without["section"][4].startswith("thickness = 0.05")
+    lists = leafdyn.sweep(fan(2), {"leaf.fan": {"narrow": [-0.1, 0.1], "wide": [-0.3, 0.3]}}, "tip_z")
+    assert lists["leaf.fan"].tolist() == ["narrow", "wide"]
+    assert lists["tip_z"][1] == leafdyn.relax(fan(2), set={"leaf.fan": [-0.3, 0.3]}).tip[2]
+    # One table, and one profile, are no dict of labels.
+    for key, span in [("section", CIRCLE), ("stiffness.torsion", {"at": [0, 1], "value": [1, 2]})]:
+        with pytest.raises(TypeError, match=f"{key}: .*must be a list of tables, or a dict of labels"):
+            leafdyn.sweep(ROD, {key: span})
+    # Numbers that differ in later digits stand apart.
+    close = leafdyn.sweep(ROD, {"section": [{"width": 0.2}, {"width": 0.2 + 1e-9}]}, "tip_z")
+    assert close["section"].nunique() == 2
+
+
+def test_whole_tables_are_set(tmp_path: Path) -> None:
+    """In a dict, a text, a file and a scenario alike."""
+    wanted = leafdyn.relax({**ROD, "section": CIRCLE}).tip.tolist()
+    softer = leafdyn.relax(ROD, set={"section.young": 5e4}).tip.tolist()
+    base = leafdyn.Scenario(ROD)
+    (tmp_path / "rod.toml").write_text(base.text)
+    replaced = leafdyn.Scenario(base, {"section.width": 0.3, "load.gravity": [0, 0, -0.1]})
+    for source in (ROD, base.text, tmp_path / "rod.toml", base, replaced):
+        found = leafdyn.relax(source, set={"section": CIRCLE})
+        assert found.tip.tolist() == wanted
+        assert found.name == "rod"
+    for source in (ROD, base.text, tmp_path / "rod.toml", base):
+        assert leafdyn.relax(source, set={"section": {"young": 5e4}}).tip.tolist() == softer
+    both = leafdyn.relax(ROD, set={"section": CIRCLE, "section.young": 5e4, "load": {"gravity": [0, 0, -0.05]}})
+    assert both.tip.tolist() == pytest.approx(wanted, abs=1e-6)
+    result = leafdyn.relax(ROD)
+    as_json = json.dumps(result.to_dict())
+    assert leafdyn.relax(as_json, set={"section": CIRCLE}).tip.tolist() == wanted
+    with pytest.raises(leafdyn.ScenarioError, match="unknown key section.yung"):
+        leafdyn.relax(ROD, set={"section": {"yung": 1}})
+
+
+def test_rows_are_leaves() -> None:
+    samples = pandas.DataFrame(
+        {"stiffness.bending_2": [1.0, 2.0, -1.0, np.nan], "leaf.length": [1.0, 1.2, 1.0, 1.0]}, index=list("abcd")
+    )
+    names = ["tip_z", "stable", "outcome", "remark"]
+    with pytest.warns(leafdyn.LeafWarning, match="2 of 4 leaves are refused, the first: at stiffness.bending_2 = -1.0"):
+        table = leafdyn.sweep(fan(2), samples, names, on_error="row")
+    assert table.index.tolist() == list("abcd")
+    assert table["outcome"].tolist() == ["converged", "converged", "refused", "refused"]
+    assert "must be greater than 0" in table["remark"]["c"] and "finite" in table["remark"]["d"]
+    assert table.loc[["c", "d"], ["tip_z", "tip_z_error", "stable"]].isna().all(axis=None)
+    assert table[["leaf.length"]].equals(samples[["leaf.length"]])
+    for name in "ab":
+        assert table["tip_z"][name] == leafdyn.relax(fan(2), set=dict(samples.loc[name])).tip[2]
+    rows = [dict(samples.loc[name]) for name in "ab"]
+    assert leafdyn.sweep(fan(2), rows, names)["tip_z"].tolist() == table["tip_z"].tolist()[:2]
+    with pytest.raises(leafdyn.ScenarioError, match="greater than 0"):
+        leafdyn.sweep(fan(2), samples)
+    # A key that a row does not have is as in the scenario; tables are rows, too.
+    some = leafdyn.sweep(ROD, [{"section": CIRCLE}, {"leaf.length": 0.5}], "tip_z")
+    assert some["tip_z"].tolist() == [leafdyn.relax({**ROD, "section": CIRCLE}).tip[2], leafdyn.relax(ROD, set={"leaf.length": 0.5}).tip[2]]
+    assert some["leaf.length"].isna().tolist() == [True, False]
+    with pytest.raises(ValueError, match="the column leaf.length is there 2 times"):
+        leafdyn.sweep(fan(2), pandas.concat([samples["leaf.length"]] * 2, axis=1))
+    with pytest.raises(TypeError, match="vary: 3: must be a key"):
+        leafdyn.sweep(fan(2), pandas.DataFrame({3: [1.0]}))
+
+
+def test_refusals_are_told() -> None:
+    """The remark has a column where some leaf is not at rest; a key that all leaves do not know is no row."""
+    assert "remark" not in leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0]})
+    with pytest.warns(leafdyn.LeafWarning, match="^fan: 1 of 2 leaves are refused, the first: .*greater than 0$"):
+        table = leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0, -1.0]}, on_error="row")
+    assert list(table.columns)[-1] == "remark"
+    assert "greater than 0" in table["remark"][1]
+    assert pandas.isna(table["remark"][0])
+    both = {"load.gravity[2]": [-1.0, -1000.0], "stiffness.torsion": [1.0, -1.0]}
+    with pytest.warns(leafdyn.LeafWarning, match="1 of 4 leaves are not at rest.*; 2 of 4 leaves are refused"):
+        leafdyn.sweep(fan(2), both, segments=4, on_error="row")
+    for vary in ({"leaf.lenght": [0.1, 0.2]}, [{"leaf.lenght": 0.1}]):
+        with pytest.raises(leafdyn.ScenarioError, match=r"unknown key leaf.lenght \(did you mean leaf.length\?\)"):
+            leafdyn.sweep(fan(2), vary, on_error="row")
+    with pytest.raises(leafdyn.ScenarioError, match="unknown key leaf.lenght"):
+        leafdyn.relax_many([fan(2), fan(3)], set={"leaf.lenght": 0.1}, on_error="row")
+    with pytest.warns(leafdyn.LeafWarning, match="1 of 2 leaves are refused, the first: .*unknown key leaf.lenght"):
+        leafdyn.sweep(fan(2), [{"leaf.length": 0.9}, {"leaf.lenght": 0.1}], on_error="row")
+    # That of one scenario is its own.
+    one, other = leafdyn.relax_many([fan(2), {**fan(2), "lief": {}}], on_error="row")
+    assert (one.outcome, other.outcome) == ("converged", "refused")
+
+
+def test_refused_leaves_have_what_leaves_have() -> None:
+    import pickle
+
+    (leaf,) = leafdyn.relax_many([{"name": "empty"}], on_error="row")
+    assert isinstance(leaf, leafdyn.RefusedLeaf)
+    assert leaf.tip.shape == (3,) and leaf.tips.shape == (1, 3)
+    assert np.isnan([*leaf.tip, *leaf.tips[0], leaf.energy, leaf.error_estimate, leaf.residual]).all()
+    assert (leaf.stable, leaf.negative_eigenvalues, leaf.frequencies, leaf.path, leaf.doubts) == (None,) * 4 + ([],)
+    assert pickle.loads(pickle.dumps(leaf)) == leaf
+    with pytest.raises(AttributeError, match="RefusedLeaf has no nonsense"):
+        leaf.nonsense
+    with pytest.raises(AttributeError, match="RefusedLeaf has no plot"):
+        leaf.plot()
+
+
+def test_what_ran_out_of_time_is_missing() -> None:
+    """A leaf that was given up on its way has no tip in a table, nor energy, path or results of functions."""
+    names = ["tip_x", "energy", "stable", "negative_eigenvalues", "residual", "path", "twist", "error_estimate"]
+    lengths = {"leaf.length": [1.0, 1.1]}
+    with pytest.warns(leafdyn.LeafWarning, match="2 of 2 leaves are not at rest .*, 2 of them because the time was over"):
+        table = leafdyn.sweep(fan(5), lengths, [*names, "outcome", "success", "remark"], time_limit=1e-9)
+    assert table["outcome"].tolist() == ["out-of-time"] * 2
+    assert table[[*names, "tip_x_error", "energy_error"]].isna().all(axis=None)
+    assert not table["success"].any()
+    assert table["remark"].str.contains("allow more").all()
+    with pytest.warns(leafdyn.LeafWarning):
+        table = leafdyn.sweep(fan(5), lengths, {"top": lambda leaf: leaf.tip[2]}, time_limit=1e-9)
+    assert table["top"].isna().all()
 
 
 def test_leaves_that_do_not_come_to_rest_are_counted() -> None:

@@ -12,7 +12,7 @@ in. Every verb of the program ``leafdyn`` is a function here; it returns what th
 """
 
 from ._branches import Boundary, Branch, Curve, Piece, Trace
-from ._errors import Interrupted, LeafWarning, MissingScenarioError, RefusedLeaf, ScenarioError
+from ._errors import Interrupted, LeafWarning, MissingScenarioError, ScenarioError
 from ._explore import Exploration, explore
 from ._fit import Candidate, Fit, LikelihoodProfile, Parameter
 from ._fitting import fit
@@ -24,10 +24,11 @@ from ._load import load
 from ._motion import Frame, Motion
 from ._posture import Bound, Posture, unbend, unbend_many
 from ._predict import Prediction
+from ._refused import RefusedLeaf
 from ._relax import modes, relax, relax_many, sensitivities
 from ._result import Result, Table
 from ._scenario import Scenario, Source
-from ._sensitivity import Sensitivity
+from ._sensitivity import Sensitivities, Sensitivity
 from ._simulate import frames, simulate
 from ._study import Chart, Check, Equilibria, Map
 from ._surface import Angles, Mesh
@@ -74,6 +75,7 @@ __all__ = [
     "Scenario",
     "ScenarioDict",
     "ScenarioError",
+    "Sensitivities",
     "Sensitivity",
     "Source",
     "Table",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from typing import Any
 
 
@@ -106,11 +105,7 @@ class LeafWarning(UserWarning):
     """What the program says beside a result: why it is not at rest, say, and what would help."""
 
 
-@dataclass(frozen=True)
-class RefusedLeaf:
-    """What stands in the list of a batch in place of a leaf that is refused."""
-
-    remark: str
-    """Why, and what to change."""
-    outcome: str = "refused"
-    success: bool = False
+def unknown_key(error: Exception) -> str | None:
+    """The key that a refusal says is unknown, if it does."""
+    key = error.key if isinstance(error, ScenarioError) else None
+    return key if key is not None and f"unknown key {key}" in str(error) else None

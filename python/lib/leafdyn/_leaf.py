@@ -14,7 +14,7 @@ from ._data import ENERGY, QUANTITIES, column_unit, dataset, node_table, node_va
 from ._draw import axes, curves, drawn_plane, labelled, smooth, tangents, ticks_by_length
 from ._pickled import Drawn
 from ._result import keep
-from ._sensitivity import Sensitivity
+from ._sensitivity import Sensitivities, Sensitivity
 from ._surface import Angles, Mesh, angles, mesh
 from ._view import Viewed
 
@@ -270,6 +270,22 @@ class Equilibrium(Viewed):
         return None if angular is None else angular / (2.0 * np.pi)
 
     @property
+    def frequency_errors(self) -> Array | None:
+        """Bounds on the errors of `frequencies`, shape (modes,), cycles per time: how far the root of an eigenvalue may be
+        off within `eigenvalue_errors`; infinite on a single grid, not a number of unstable modes, none if not known."""
+        if self._motions is not None:
+            told = [self._core.column(f"frequency_{mode}_error") for mode in range(1, len(self._motions[2]) + 1)]
+            return np.array([math.inf if error is None else error for error in told], dtype=np.float64)
+        if self.eigenvalues is None or self.eigenvalue_errors is None:
+            return None
+        with np.errstate(invalid="ignore"):
+            root = np.sqrt(self.eigenvalues)
+            low = np.sqrt(np.maximum(self.eigenvalues - self.eigenvalue_errors, 0.0))
+            high = np.sqrt(np.maximum(self.eigenvalues + self.eigenvalue_errors, 0.0))
+            bounds: Array = np.maximum(root - low, high - root) / (2.0 * np.pi)
+        return bounds
+
+    @property
     def growth_rates(self) -> Array | None:
         """Under forces without a potential: growth rates of the small motions whose frequencies are `frequencies`, shape
         (motions,), per time, negative of those that decay; none of other leaves, and if not known."""
@@ -319,14 +335,15 @@ class Equilibrium(Viewed):
         return self._mode_shapes[3]
 
     @computed
-    def sensitivities(self) -> dict[str, Sensitivity]:
-        """How its results change with the numbers that were asked for, by their keys: see `leafdyn.sensitivities`. There
-        are none of a leaf that is not at rest, and of a number in which the leaf is not smooth."""
+    def sensitivities(self) -> Sensitivities:
+        """How its results change with the numbers that were asked for, a dict by their keys: see `leafdyn.sensitivities`;
+        ``sensitivities.to_pandas()`` is a table. There are none of a leaf that is not at rest, and of a number in which
+        the leaf is not smooth."""
         if self._request is None or not self._request[1]["sensitivity"]:
-            return {}
+            return Sensitivities()
         places = {found[0]: found[1:] for found in self._core.position_changes()}
         entries = self.to_dict()["sensitivities"]
-        return {entry["key"]: Sensitivity(entry, *places[entry["key"]]) for entry in entries}
+        return Sensitivities({entry["key"]: Sensitivity(entry, *places[entry["key"]]) for entry in entries})
 
     @property
     def margin(self) -> dict[str, Any] | None:
@@ -392,6 +409,7 @@ class Equilibrium(Viewed):
             "eigenvalues": (modes, self.eigenvalues, (0, 0, -2)),
             "eigenvalue_errors": (modes, self.eigenvalue_errors, (0, 0, -2)),
             "frequencies": (modes, self.frequencies, (0, 0, -1)),
+            "frequency_errors": (modes, getattr(self, "frequency_errors", None), (0, 0, -1)),
             "growth_rates": (modes, self.growth_rates, (0, 0, -1)),
             "effective_masses": ((*modes, "component"), getattr(self, "effective_masses", None), (-1, 1, 2)),
             "mode_displacements": ((*modes, *line, "component"), shapes[0] if some else None, None),

@@ -22,7 +22,7 @@ from ._motion import ENERGIES, Motion
 from ._posture import Posture
 from ._result import Kept, Result, columns
 from ._scenario import Scenario
-from ._sensitivity import Sensitivity
+from ._sensitivity import Sensitivities, Sensitivity
 from ._study import Chart, Equilibria, Map
 
 Loaded = TypeVar("Loaded", bound=Result)
@@ -177,7 +177,9 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         "tips": _array(tips),
         "curves": positions,
         "curve_stations": stations,
-        "sensitivities": {entry["key"]: Sensitivity(entry, np.empty(0), nowhere, None) for entry in entries},
+        "sensitivities": Sensitivities(
+            {entry["key"]: Sensitivity(entry, np.empty(0), nowhere, None) for entry in entries}
+        ),
         "grip_reactions": [_force_and_moment(grip) for grip in said.get("grip_reactions") or []],
         "base_reactions": [_force_and_moment(base) for base in on_bases],
         "base_reaction": None if on_all is None else _force_and_moment(on_all),

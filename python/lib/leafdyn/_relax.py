@@ -9,11 +9,13 @@ from typing import Any, Literal, SupportsIndex, overload
 
 from . import _leafdyn
 from ._arguments import numbers, switches, text, texts, whole
-from ._errors import LeafWarning, RefusedLeaf, keeping
+from ._errors import LeafWarning, keeping, unknown_key
 from ._leaf import Equilibrium
 from ._points import Points, point_table
 from ._progress import Heard, Progress, reporter
+from ._refused import RefusedLeaf
 from ._scenario import Scenario, Source, checked
+from ._tables import given
 
 
 def asked_for(
@@ -109,12 +111,16 @@ def relax(
 ) -> Equilibrium:
     """Find how a leaf comes to rest.
 
+    Each leaf is loaded by itself: leaves whose numbers differ may lie on different branches of equilibria, where there are
+    several. One branch is followed by `trace`, or from leaf to leaf by `start`.
+
     Parameters
     ----------
     scenario
         A path, a text in TOML or JSON, a dict of the same form, or a `Scenario`.
     set
-        Entries that are replaced: ``{"leaf.rods": 5}``.
+        Entries that are replaced: ``{"leaf.rods": 5}``. Of a whole table, ``{"section": {"young": 2e9}}``, the entries
+        that it has are replaced and the others stay; a ``section`` with a ``shape`` takes the place of the whole one.
     tolerance
         Accuracy of the centerlines, relative to the longest rod; left out: the scenario's.
     method
@@ -147,7 +153,8 @@ def relax(
     stations
         At ``stations + 1`` equally spaced stations of every vein; left out: those of the finest grid, at least 17.
     time_limit
-        Seconds after which the leaf is given up: as far as it came, with the outcome ``"out-of-time"``.
+        Seconds after which the leaf is given up: as far as it came, with the outcome ``"out-of-time"``. Its numbers are
+        then those of a leaf on its way, and of no equilibrium.
     progress
         A function of how much is done, of how much (none if unknown), and a text; or true for a bar of tqdm.
 
@@ -292,9 +299,11 @@ def relax_many(
     ----------
     on_error
         ``"raise"``: all scenarios are checked before the first is solved, and the first that is refused ends the run.
-        ``"row"``: a `RefusedLeaf` takes the place of each that is refused, with the message as its ``remark``.
+        ``"row"``: a `RefusedLeaf` takes the place of each that is refused, with the message as its ``remark``. An unknown
+        key of `set` is raised. Samples whose scenarios may be refused are rows for `sweep`.
     time_limit
-        Seconds for all leaves together; those that are not at rest then have the outcome ``"out-of-time"``.
+        Seconds for all leaves together; those that are not at rest then have the outcome ``"out-of-time"``, and are as far
+        as they came: use the numbers of those alone that have ``success``. In the table of `sweep` the others are missing.
 
     Returns
     -------
@@ -331,15 +340,19 @@ def relax_many(
     )
     told = tells_refusals(on_error)
     leaves: list[Scenario | RefusedLeaf] = []
+    unknown: list[Exception] = []
     for number, scenario in enumerate(scenarios):
         try:
             leaves.append(checked(scenario, set))
         except (ValueError, TypeError) as refused:
+            unknown += [refused] if unknown_key(refused) in (set or {}) else []
             if told:
                 leaves.append(RefusedLeaf(str(refused)))
                 continue
             refused.args = (f"scenarios[{number}]: {refused}",)
             raise
+    if unknown and len(unknown) == len(leaves):
+        raise unknown[0]
     with reporter(progress) as heard:
         found = relaxed(leaves, asked, heard, told)
     for number, leaf in enumerate(found):
@@ -446,14 +459,20 @@ def sensitivities(
     keys
         One or more numbers: ``"stiffness.axial"``, ``"load.gravity[2]"``, ``"stiffness.bending_2[5]"``, or
         ``"scale:stiffness.bending_2"``, all numbers of that key times a factor. A key of a list or of a profile stands
-        for each of its entries, ``"stiffness.bending_2.value[0]"`` and so on.
+        for each of its entries, ``"stiffness.bending_2.value[0]"`` and so on. ``"all"``: every number that the scenario
+        gives, as far as the leaf at rest depends on it.
     modes
         How many frequencies to differentiate; none, and no lowest eigenvalue either, is faster.
 
     Returns
     -------
     Equilibrium
-        With ``sensitivities``: a `Sensitivity` for each key.
+        With ``sensitivities``, a dict of a `Sensitivity` for each key; ``sensitivities.to_pandas()`` is a table.
+
+    Warns
+    -----
+    LeafWarning
+        As `relax`, and by which keys there is none, because the leaf at rest does not depend on them, or not smoothly.
 
     Examples
     --------
@@ -469,11 +488,61 @@ def sensitivities(
     words = texts("keys", keys, "stiffness.axial")
     asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
     leaf = checked(scenario, set)
+    every = words == ["all"]
+    if every:
+        asked["sensitivity"] = _numbers(leaf)
 
     def made(core: _leafdyn.Leaf) -> Equilibrium:
         return Equilibrium(core, (leaf, asked))
 
     with reporter(progress) as heard, keeping(made):
-        found = made(_leafdyn.relax(leaf._core, asked, heard))
+        while True:
+            try:
+                found = made(_leafdyn.relax(leaf._core, asked, heard))
+                break
+            except ValueError as refused:
+                # Keys are refused one by one, before the leaf is solved.
+                asked["sensitivity"] = _without_refused(leaf, asked["sensitivity"], str(refused), every)
+                if not asked["sensitivity"]:
+                    raise
     warn(found.name, found.remark, *found.doubts)
+    if found.success and not every:
+        keys_found = tuple(found.sensitivities)
+        none = [word for word in words if not any(_is_of(key, word.strip()) for key in keys_found)]
+        if none:
+            warn(found.name, f"no sensitivity by {', '.join(none)}: the leaf at rest does not depend on it, or not smoothly")
     return found
+
+
+def _numbers(leaf: Scenario) -> list[str]:
+    """Keys of all that the scenario gives as numbers."""
+    entries = given(leaf.text, leaf.overrides)
+    return [key for key, value in entries.items() if _is_numeric(value)]
+
+
+def _is_numeric(value: Any) -> bool:
+    if isinstance(value, Mapping):
+        value = value.get("value")
+    if isinstance(value, list):
+        return bool(value) and all(_is_numeric(part) for part in value)
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _without_refused(leaf: Scenario, words: list[str], message: str, every: bool) -> list[str]:
+    """Keys for which to ask in place of those that were refused: of a list its entries; none if it stays refused."""
+    word, _, why = message.partition(": ")
+    if word not in words:
+        return []
+    entries: list[str] = []
+    if why.startswith("is a list: give an index"):
+        found = given(leaf.text, leaf.overrides).get(word)
+        entries = [f"{word}[{number}]" for number in range(len(found) if isinstance(found, list) else 0)]
+    if not entries and not every:
+        return []
+    at = words.index(word)
+    return [*words[:at], *entries, *words[at + 1 :]]
+
+
+def _is_of(key: str, word: str) -> bool:
+    """Whether a key is the one that was asked for, or an entry of it."""
+    return key == word or key.startswith((f"{word}[", f"{word}."))

@@ -104,11 +104,12 @@ class Result:
         return written
 
     def figure(self, name: str | None = None) -> str:
-        """A figure of the program as SVG, by its name; left out, the first it draws."""
+        """A figure of the program as SVG, by its name with or without ``.svg``; left out, the first it draws."""
         names = [file for file in self._files.names() if file.endswith(".svg")]
-        if name is not None and name not in names:
+        file = names[0] if name is None else name if name in names else f"{name}.svg"
+        if file not in names:
             raise ValueError(f"name = {name!r}: must be one of {', '.join(names)}")
-        return self._files.contents(name or names[0]).decode()
+        return self._files.contents(file).decode()
 
     def _repr_svg_(self) -> str:
         return self.figure()

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from . import _leafdyn
 from ._errors import MissingScenarioError, ScenarioError
 from ._quantities import plain
+from ._tables import belongs, dotted, read, replaces, without
 
 
 class Scenario:
@@ -26,7 +27,9 @@ class Scenario:
         string with a line break is a text, and so is one that contains an equals sign or begins with a brace, unless it
         ends in ``.toml`` or ``.json``.
     set
-        Entries that are replaced: ``{"leaf.rods": 5, "load.gravity": [0, 0, -0.5]}``.
+        Entries that are replaced: ``{"leaf.rods": 5, "load.gravity": [0, 0, -0.5]}``. Of a whole table,
+        ``{"section": {"young": 2e9}}``, the entries that it has are replaced and the others stay; a ``section`` with a
+        ``shape`` takes the place of the whole one.
 
     Raises
     ------
@@ -53,7 +56,11 @@ class Scenario:
             raise TypeError(f'set = {set!r}: a dict is wanted, such as {{"leaf.rods": 5}}')
         if "pint" in sys.modules:
             source, set = _without_units(source, set or {})
-        entries = _leafdyn.overrides(set) if set else []
+        kept: list[str] = []
+        for table in [key for key, value in (set or {}).items() if replaces(key, value)]:
+            source, others = _without_table(source, table)
+            kept = [entry for entry in kept if not belongs(entry, table)] + others
+        entries = kept + (_leafdyn.overrides(dotted(set)) if set else [])
         if isinstance(source, Scenario):
             self._core = source._core.replaced(entries) if entries else source._core
         elif isinstance(source, Mapping):
@@ -138,6 +145,16 @@ def _without_units(source: Any, set: Mapping[str, Any]) -> tuple[Any, Mapping[st
 
     entries = {key: plain(value, key, units) for key, value in set.items()}
     return (plain(source, "", units) if isinstance(source, Mapping) else source), entries
+
+
+def _without_table(source: Any, table: str) -> tuple[dict[str, Any], list[str]]:
+    """A scenario as a dict without one of its tables, and what else was replaced in it."""
+    if isinstance(source, Mapping):
+        return without(source, table), []
+    found = source if isinstance(source, Scenario) else Scenario(source)
+    own = without(read(found.text), table)
+    kept = [entry for entry in found.overrides if not belongs(entry, table)]
+    return {"name": found.name} | own, kept
 
 
 Source: TypeAlias = Union[str, "os.PathLike[str]", Mapping[str, Any], Scenario]

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._attribute import Attribute
+from ._data import pandas
 from ._result import read_only
+
+if TYPE_CHECKING:
+    from pandas import DataFrame as _DataFrame
 
 Array = NDArray[np.float64]
 
@@ -73,6 +77,51 @@ class Sensitivity:
         tip = "" if self.tip is None else f", tip ({', '.join(f'{x:.5g}' for x in self.tip)})"
         within = f" within {self.tip_error:.1e}" if math.isfinite(self.tip_error) else ""
         return f"<Sensitivity by {self.key} = {self.value:.6g}{tip}{within}>"
+
+
+class Sensitivities(dict[str, Sensitivity]):
+    """Sensitivities by the keys of the numbers: a dict, and a table."""
+
+    def to_pandas(self) -> _DataFrame:
+        """A ``pandas.DataFrame`` with a row for each ``key``: its ``value``, and by how much results change with it, by one
+        unit of the number, each with a bound on its error behind it (but for frequencies): ``tip_x`` (of the joint tip, or
+        the first rod's), ``energy``, ``lowest_eigenvalue``, ``frequency_1`` and so on, ``reaction_x`` (of a held tip) and
+        ``grip_1_x``, as the columns of `leafdyn.sweep`. What is not known is not a number.
+
+        Examples
+        --------
+        >>> import leafdyn
+        >>> fan = leafdyn.example("fig04")
+        >>> found = leafdyn.sensitivities(fan, ["stiffness.bending_2", "load.gravity[2]"], set={"leaf.rods": 5})
+        >>> table = found.sensitivities.to_pandas()
+        >>> table.loc["load.gravity[2]", ["value", "tip_z"]].round(4).tolist()
+        [-1.0, 0.1413]
+        """
+        rows = {key: _row(one) for key, one in self.items()}
+        found = pandas().DataFrame.from_dict(rows, orient="index", dtype=np.float64)
+        found.index.name = "key"
+        return found
+
+
+def _row(one: Sensitivity) -> dict[str, float]:
+    """That of a table."""
+    found = {"value": one.value} | _components("tip", one.tips[0], one.tip_error)
+    for name in ("energy", "lowest_eigenvalue"):
+        change = getattr(one, name)
+        found |= {name: math.nan if change is None else change, f"{name}_error": getattr(one, f"{name}_error")}
+    found |= {f"frequency_{mode}": change for mode, change in enumerate(one.frequencies.tolist(), 1)}
+    if one.tip_reaction is not None:
+        found |= _components("reaction", one.tip_reaction, one.tip_reaction_error)
+    for number, (force, _) in enumerate(one.grip_reactions, 1):
+        found |= _components(f"grip_{number}", force, one.grip_reactions_error)
+    return found
+
+
+def _components(name: str, vector: Array, error: float) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for axis, change in zip("xyz", vector.tolist()):
+        found |= {f"{name}_{axis}": change, f"{name}_{axis}_error": error}
+    return found
 
 
 _BOUNDS = ("tip_error", "energy_error", "lowest_eigenvalue_error", "tip_reaction_error", "grip_reactions_error")

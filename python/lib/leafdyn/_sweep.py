@@ -12,11 +12,12 @@ import numpy as np
 
 from . import _leafdyn
 from ._data import column_unit, pandas, unit
-from ._errors import Interrupted, RefusedLeaf, keeping
+from ._errors import Interrupted, keeping, unknown_key
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
-from ._quantities import plain
+from ._quantities import Units, plain
 from ._range import Range, spans, values
+from ._refused import RefusedLeaf
 from ._relax import asked_for, relaxed, tells_refusals, warn
 from ._scenario import Scenario, Source, checked
 
@@ -27,7 +28,7 @@ Of = Callable[[Equilibrium], Any]
 """What is wanted of a leaf."""
 
 COLUMNS = ("tip_x", "tip_y", "tip_z", "energy", "stable", "negative_eigenvalues", "error_estimate", "outcome")
-"""What a sweep finds if nothing else is asked for."""
+"""What a sweep finds if nothing else is asked for, and the remark where some leaf is not at rest."""
 
 AT_ONCE = 2000
 """Leaves that are kept until what is wanted of them is known."""
@@ -35,8 +36,8 @@ AT_ONCE = 2000
 AT_ONCE_WITH_MODES = 200
 """Leaves that are kept where they have shapes of modes."""
 
-Values: TypeAlias = Union[Range, Iterable[Any]]
-"""What a key takes one after the other."""
+Values: TypeAlias = Union[Range, Iterable[Any], Mapping[str, Any]]
+"""What a key takes one after the other; with labels, a dict of them."""
 
 Keys: TypeAlias = Union[str, tuple[str, ...]]
 """A key, or several that take the same value: joined by ``+``, or in a tuple."""
@@ -44,7 +45,7 @@ Keys: TypeAlias = Union[str, tuple[str, ...]]
 
 def sweep(
     scenario: Source,
-    vary: str | Iterable[str] | Mapping[str, Values] | Mapping[Any, Values],
+    vary: str | Iterable[str] | Mapping[str, Values] | Mapping[Any, Values] | Iterable[Mapping[Any, Any]] | _DataFrame,
     columns: str | Iterable[str] | Mapping[str, Of] = COLUMNS,
     *,
     errors: bool = True,
@@ -60,18 +61,26 @@ def sweep(
     client: Any = None,
     progress: Progress = None,
 ) -> _DataFrame:
-    """Find how a leaf comes to rest over all combinations of some numbers of its scenario, on all cores.
+    """Find how a leaf comes to rest over all combinations of some numbers of its scenario, or with those of every row of a
+    table, on all cores.
 
-    Parameters that are not listed are those of `relax`.
+    Parameters that are not listed are those of `relax`. Each leaf is loaded by itself: rows may lie on different branches of equilibria, where there are several. One branch is
+    followed by `trace`, or from leaf to leaf by ``relax(start=...)``.
 
     Parameters
     ----------
     vary
         Keys with their values, ``{"load.gravity[2]": np.linspace(-1, -4, 20), "leaf.rods": [3, 5]}``: arrays, lists, or
         ranges ``(low, high)``, ``(low, high, "log")``, ``(low, high, count)``. The last key changes fastest. Several
-        keys joined by ``+``, or in a tuple, take the same values: ``{("coupling.y", "coupling.z"): (0.5, 2)}``. A key of
-        a whole table takes dicts: ``{"section": [{"thickness": 0.1}, {"thickness": 0.2}]}``. Or the program's words,
+        keys joined by ``+``, or in a tuple, take the same values: ``{("coupling.y", "coupling.z"): (0.5, 2)}``. Values
+        with labels, which stand in the table in their place, are a dict: ``{"leaf.fan": {"narrow": [-0.1, 0.1], "wide":
+        [-0.3, 0.3]}}``. A key of a whole table takes dicts, ``{"section": [{"thickness": 0.1}, {"thickness": 0.2}]}``, or
+        labels with dicts; without labels the table has a text of the entries in which they differ. Entries are replaced
+        and the others stay, but a ``section`` with a ``shape`` takes the place of the whole one. Or the program's words,
         ``"load.gravity[2]=-1..-4:20"``, or a list of such texts.
+
+        Samples are rows, one leaf each: a ``pandas.DataFrame`` whose columns are keys, or a list of dicts of which a key
+        that a row does not have is as in the scenario. The rows of the result have the index of the ``DataFrame``.
     columns
         ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"base_reaction_x"`` and so on (the
         force on the supports of all bases), ``"base_moment_x"`` (the moment about their mean), ``"reaction_x"`` (of a
@@ -79,23 +88,25 @@ def sweep(
         ``"negative_eigenvalues"``, ``"neutral_directions"``, ``"error_estimate"``, ``"error_in_veins"`` (of blades),
         ``"outcome"``, ``"success"``, ``"remark"``, ``"residual"``, ``"path"``, ``"margin_waves"``, ``"margin_amplitude"``,
         ``"twist"``, ``"wall_seconds"``, ``"lowest_eigenvalue"``, ``"frequency_1"`` and so on (cycles per time, as accurate
-        as those of `modes`), ``"growth_rate_1"`` (without a potential); or a dict of functions of an `Equilibrium`.
+        as those of `modes`), ``"growth_rate_1"`` (without a potential); or a dict of functions of an `Equilibrium`. Left
+        out: the default, and ``"remark"`` where some leaf is refused or not at rest.
     errors
         Whether every number that has a bound on its error is followed by it: ``"tip_x_error"``,
         ``"frequency_1_error"``. Such a column can be named, too.
     on_error
         ``"raise"``, or ``"row"``: a leaf that is refused has a row with the outcome ``"refused"``, and the message as
-        its ``remark``.
+        its ``remark``. A key that is unknown for all leaves is raised.
     time_limit
         Seconds for all leaves together, or with a client for each; those that are not at rest then have the outcome
-        ``"out-of-time"``.
+        ``"out-of-time"``, and all else of them is missing, as of those that are refused.
     client
         A ``dask.distributed.Client``, whose workers then solve the leaves.
 
     Returns
     -------
     pandas.DataFrame
-        A row a leaf: the keys, and the columns. What is not known is missing (NaN or NA), a bound infinite.
+        A row a leaf: the keys, and the columns. What is not known is missing (NaN or NA), a bound infinite. Functions
+        are not asked of leaves that are refused or out of time.
         ``attrs["units"]`` has the units that the scenario names, by columns.
 
     Raises
@@ -103,14 +114,15 @@ def sweep(
     ImportError
         Without pandas.
     ScenarioError
-        If the scenario is refused with some of the values, unless `on_error` is ``"row"``; nothing is solved then.
+        If the scenario is refused with some of the values, unless `on_error` is ``"row"``, or all of them have an unknown
+        key; nothing is solved then.
     ValueError
         If the request cannot be met.
 
     Warns
     -----
     LeafWarning
-        How many leaves are not at rest within the tolerance, if any.
+        How many leaves are not at rest within the tolerance, and how many are refused, with the first message.
 
     Examples
     --------
@@ -122,9 +134,22 @@ def sweep(
     1          3             -2.0 -0.2751    True
     2          5             -1.0 -0.1460    True
     3          5             -2.0 -0.2791    True
+
+    Three leaves drawn at random, one a row:
+
+    >>> import numpy, pandas
+    >>> draw = numpy.random.default_rng(1)
+    >>> leaves = {"leaf.length": draw.normal(1, 0.1, 3), "stiffness.bending_2": draw.lognormal(0, 0.2, 3)}
+    >>> samples = pandas.DataFrame(leaves, index=["a", "b", "c"])
+    >>> leafdyn.sweep("scenarios/paper/fig04.toml", samples, "tip_z", errors=False).round(4)
+       leaf.length  stiffness.bending_2   tip_z
+    a       1.0346               0.7706 -0.2409
+    b       1.0822               1.1985 -0.1607
+    c       1.0330               1.0934 -0.1496
     """
     package = pandas()
-    wanted, kinds = _wanted(columns, errors)
+    by_default = columns is COLUMNS
+    wanted, kinds = _wanted([*COLUMNS, "remark"] if by_default else columns, errors)
     modes = max((kind.modes for kind in kinds.values()), default=0)
     asked = asked_for(
         method,
@@ -142,22 +167,23 @@ def sweep(
     )
     told = tells_refusals(on_error)
     base = checked(scenario, set)
-    given: Mapping[Any, Any] = vary if isinstance(vary, Mapping) else spans(vary)
-    named = {_joined(keys): span for keys, span in given.items()}
-    axes = {key: values(key, plain(span, key, lambda: base.units)) for key, span in named.items()}
-    grid = list(product(*axes.values()))
-    leaves = [_at(base, dict(zip(axes, point)), told) for point in grid]
+    samples = _samples(vary, lambda: base.units)
+    leaves = _leaves(base, samples, told)
 
     def table(rows: Sequence[Row | None]) -> _DataFrame:
         finished = [number for number, row in enumerate(rows) if row is not None]
-        points, cells = [grid[number] for number in finished], [row[1] for row in rows if row is not None]
+        done = [row for row in rows if row is not None]
+        names = list(wanted)[:-1] if by_default and all(row.success for row in done) else list(wanted)
+        index = samples.index
+        if len(finished) < len(leaves):
+            index = finished if index is None else index[finished]
         found = package.DataFrame(
-            {key: _varied([point[at] for point in points]) for at, key in enumerate(axes)}
-            | {name: _column(package, kinds.get(name), [row[at] for row in cells]) for at, name in enumerate(wanted)},
-            index=None if len(finished) == len(grid) else finished,
+            {key: _varied([column[number] for number in finished]) for key, column in samples.columns.items()}
+            | {name: _column(package, kinds.get(name), [row.cells[at] for row in done]) for at, name in enumerate(names)},
+            index=index,
         )
-        units = {name: column_unit(base.units, name) for name in axes}
-        units |= {name: kind.unit(name, base.units) for name, kind in kinds.items()}
+        units = {name: column_unit(base.units, name) for name in samples.columns}
+        units |= {name: kinds[name].unit(name, base.units) for name in names if name in kinds}
         found.attrs = {"scenario": base.name, "units": {name: unit for name, unit in units.items() if unit is not None}}
         return found
 
@@ -168,32 +194,126 @@ def sweep(
         else:
             one = partial(_row, wanted=wanted, kinds=kinds, asked=asked, told=told)
             rows = _gathered(client, client.map(one, leaves, batch_size=max(1, len(leaves) // 100), pure=False))
-    failed = sum(not success for success, _ in rows)
-    if failed:
-        warn(base.name, f"{failed} of {len(rows)} leaves are not at rest within the tolerance: see the column outcome")
+    warn(base.name, _failures(rows))
     return table(rows)
+
+
+def _failures(rows: Sequence[Row]) -> str | None:
+    """How many leaves are not at rest, and how many refused."""
+    refused = [row for row in rows if row.outcome == REFUSED]
+    failed = [row for row in rows if not row.success and row.outcome != REFUSED]
+    late = sum(row.outcome == OUT_OF_TIME for row in failed)
+    said = []
+    if failed:
+        why = f", {late} of them because the time was over" if late else ""
+        said = [f"{len(failed)} of {len(rows)} leaves are not at rest within the tolerance{why}: see the column outcome"]
+    if refused:
+        said.append(f"{len(refused)} of {len(rows)} leaves are refused, the first: {refused[0].remark}")
+    return "; ".join(said) or None
+
+
+class Samples(NamedTuple):
+    """The leaves of a sweep."""
+
+    points: list[dict[str, Any]]
+    """What is replaced in each, by keys."""
+    columns: dict[str, list[Any]]
+    """How that stands in the table: tables as their labels."""
+    index: Any
+    """That of the table; none where rows are counted."""
+
+
+def _samples(vary: Any, units: Units) -> Samples:
+    """Leaves over a grid, or of the rows of a table."""
+    if hasattr(vary, "columns") and hasattr(vary, "iloc"):
+        keys = [_joined(key) for key in vary.columns]
+        for key in keys:
+            if keys.count(key) > 1:
+                raise ValueError(f"vary: the column {key} is there {keys.count(key)} times: leave all but one out")
+        cells = {key: plain(list(vary.iloc[:, at]), key, units) for at, key in enumerate(keys)}
+        points = [dict(zip(keys, row)) for row in zip(*cells.values())] if keys else [{} for _ in range(len(vary))]
+        return Samples(points, {key: _labels(column) for key, column in cells.items()}, vary.index)
+    if not isinstance(vary, (str, Mapping)) and isinstance(vary, Iterable):
+        vary = list(vary)
+        if vary and all(isinstance(row, Mapping) for row in vary):
+            points = [{_joined(key): plain(value, _joined(key), units) for key, value in row.items()} for row in vary]
+            every = dict.fromkeys(key for point in points for key in point)
+            return Samples(points, {key: _labels([point.get(key, nan) for point in points]) for key in every}, None)
+    given: Mapping[Any, Any] = vary if isinstance(vary, Mapping) else spans(vary)
+    axes = {_joined(keys): _axis(_joined(keys), span, units) for keys, span in given.items()}
+    grid = list(product(*axes.values()))
+    points = [{key: value for key, (_, value) in zip(axes, point)} for point in grid]
+    return Samples(points, {key: [point[at][0] for point in grid] for at, key in enumerate(axes)}, None)
+
+
+def _axis(key: str, span: Any, units: Units) -> list[tuple[Any, Any]]:
+    """What a key takes one after the other, with the labels that stand for it in the table."""
+    if not isinstance(span, Mapping):
+        found = values(key, plain(span, key, units))
+        return list(zip(_labels(found), found))
+    parts = plain(list(span.values()), key, units)
+    is_whole = "." not in key and not all(isinstance(part, Mapping) for part in parts)
+    # A profile is no dict of labels, and one table neither.
+    if "value" in span or is_whole:
+        raise TypeError(f"{key}: {dict(span)!r}: must be a list of tables, or a dict of labels and tables")
+    return list(zip(span, parts))
+
+
+def _labels(column: list[Any]) -> list[Any]:
+    """Values as they stand in a table: of tables, which are no keys for pandas, the entries in which they differ.
+
+    >>> _labels([{"young": 1e9, "width": 0.1}, {"young": 1e9, "width": 0.2}])
+    ['width = 0.1', 'width = 0.2']
+    """
+    tables = [value for value in column if isinstance(value, Mapping)]
+    if not tables:
+        return column
+    every = dict.fromkeys(name for table in tables for name in table)
+    differ = [name for name in every if len({repr(table.get(name)) for table in tables}) > 1] or list(every)
+    apart = {repr(dict(table)) for table in tables}
+    texts: list[str] = []
+    for text in (_short, str):
+        texts = [", ".join(f"{name} = {text(table[name])}" for name in differ if name in table) for table in tables]
+        if len(set(texts)) == len(apart):
+            break
+    names = iter(texts)
+    return [next(names) if isinstance(value, Mapping) else value for value in column]
+
+
+def _short(value: Any) -> str:
+    text = f"{value:g}" if isinstance(value, float) else str(value)
+    return text if len(text) <= LABEL else f"{text[:LABEL]}..."
+
+
+LABEL = 30
+"""Letters of an entry in the text of a table."""
 
 
 def _joined(keys: Keys) -> str:
     """Keys that take the same value, as the program names them."""
-    return "+".join(keys) if isinstance(keys, tuple) else keys
+    joined = "+".join(keys) if isinstance(keys, tuple) and all(isinstance(key, str) for key in keys) else keys
+    if not isinstance(joined, str):
+        raise TypeError(f'vary: {keys!r}: must be a key, such as "leaf.rods", or several in a tuple')
+    return joined
 
 
-def _at(base: Scenario, point: Mapping[str, Any], told: bool) -> Scenario | RefusedLeaf:
-    """The scenario with these values, or why it is refused."""
-    entries: dict[str, Any] = {}
-    for keys, value in point.items():
-        for key in keys.split("+"):
-            # A whole table has its entries replaced.
-            is_table = isinstance(value, Mapping) and "." not in key
-            entries |= {f"{key}.{name}": part for name, part in value.items()} if is_table else {key: value}
-    try:
-        return Scenario(base, entries)
-    except ValueError as refused:
-        refused.args = (f"at {', '.join(f'{key} = {value}' for key, value in point.items())}: {refused}",)
-        if not told:
-            raise
-        return RefusedLeaf(str(refused))
+def _leaves(base: Scenario, samples: Samples, told: bool) -> list[Scenario | RefusedLeaf]:
+    """The scenario with the values of each sample, or why it is refused."""
+    leaves: list[Scenario | RefusedLeaf] = []
+    unknown: list[Exception] = []
+    for number, point in enumerate(samples.points):
+        try:
+            leaves.append(Scenario(base, {key: value for keys, value in point.items() for key in keys.split("+")}))
+        except (ValueError, TypeError) as refused:
+            place = ", ".join(f"{key} = {samples.columns[key][number]}" for key in point)
+            unknown += [refused] if unknown_key(refused) else []
+            refused.args = (f"at {place}: {refused}",)
+            if not told:
+                raise
+            leaves.append(RefusedLeaf(str(refused)))
+    if unknown and len(unknown) == len(leaves):
+        raise unknown[0]
+    return leaves
 
 
 class Kind(NamedTuple):
@@ -222,8 +342,20 @@ class Kind(NamedTuple):
 
 Kinds = Mapping[str, Kind]
 
-Row: TypeAlias = tuple[bool, list[Any]]
-"""Whether a leaf is at rest, and what is wanted of it."""
+
+class Row(NamedTuple):
+    """What became of a leaf."""
+
+    outcome: str
+    success: bool
+    remark: str | None
+    cells: list[Any]
+    """What is wanted of it."""
+
+
+REFUSED = "refused"
+OUT_OF_TIME = "out-of-time"
+"""Of a leaf that is on its way: its numbers are those of no equilibrium."""
 
 
 def _solved(
@@ -271,10 +403,12 @@ def _row(
 
 
 def _of(leaf: Equilibrium | RefusedLeaf, wanted: Mapping[str, Of], kinds: Kinds) -> Row:
-    if isinstance(leaf, RefusedLeaf):
-        said = {"outcome": leaf.outcome, "remark": leaf.remark, "success": False}
-        return False, [said.get(name, kinds[name].missing if name in kinds else nan) for name in wanted]
-    return leaf.success, [of(leaf) for of in wanted.values()]
+    if isinstance(leaf, RefusedLeaf) or leaf.outcome == OUT_OF_TIME:
+        said = {"outcome": leaf.outcome, "remark": leaf.remark, "success": False, "wall_seconds": leaf.wall_seconds}
+        cells = [said.get(name, kinds[name].missing if name in kinds else nan) for name in wanted]
+    else:
+        cells = [of(leaf) for of in wanted.values()]
+    return Row(leaf.outcome, leaf.success, leaf.remark, cells)
 
 
 def _wanted(columns: str | Iterable[str] | Mapping[str, Of], errors: bool) -> tuple[dict[str, Of], dict[str, Kind]]:
