@@ -185,7 +185,7 @@ def test_rows_are_leaves() -> None:
         {"stiffness.bending_2": [1.0, 2.0, -1.0, np.nan], "leaf.length": [1.0, 1.2, 1.0, 1.0]}, index=list("abcd")
     )
     names = ["tip_z", "stable", "outcome", "remark"]
-    with pytest.warns(leafdyn.LeafWarning, match="2 of 4 leaves are refused, the first: at stiffness.bending_2 = -1.0"):
+    with pytest.warns(leafdyn.LeafWarning, match="2 of 4 leaves are refused, the first: row c: set stiffness.bending_2=-1.0"):
         table = leafdyn.sweep(fan(2), samples, names, on_error="row")
     assert table.index.tolist() == list("abcd")
     assert table["outcome"].tolist() == ["converged", "converged", "refused", "refused"]
@@ -196,7 +196,7 @@ def test_rows_are_leaves() -> None:
         assert table["tip_z"][name] == leafdyn.relax(fan(2), set=dict(samples.loc[name])).tip[2]
     rows = [dict(samples.loc[name]) for name in "ab"]
     assert leafdyn.sweep(fan(2), rows, names)["tip_z"].tolist() == table["tip_z"].tolist()[:2]
-    with pytest.raises(leafdyn.ScenarioError, match="greater than 0"):
+    with pytest.raises(leafdyn.ScenarioError, match="^row c: .*greater than 0"):
         leafdyn.sweep(fan(2), samples)
     # A key that a row does not have is as in the scenario; tables are rows, too.
     some = leafdyn.sweep(ROD, [{"section": CIRCLE}, {"leaf.length": 0.5}], "tip_z")

@@ -31,6 +31,10 @@ column: leafdyn.ScenarioDict = {
 leaf = leafdyn.relax(column, start=leafdyn.relax("other.toml"))
 height: float = leaf.tip[2]
 sharp: bool = leaf.error_estimate < 1e-6
+rows = leafdyn.sweep(column, [{"leaf.length": 1.0}, {"leaf.length": np.float64(2.0)}], on_error="row")
+labels = leafdyn.sweep(column, {"section": {"thin": {"width": 0.1}, "thick": {"width": 0.2}}})
+depths: list[float] = [one.tip[2] for one in leafdyn.relax_many([column], on_error="row")]
+table = leafdyn.sensitivities(column, "all").sensitivities.to_pandas()
 """
 
 

@@ -70,6 +70,8 @@ def test_quantities_have_the_units_of_the_scenario(pint: Any) -> None:
     assert leafdyn.Scenario(scenario, {"leaf.length": 0.5 * pint.inch}).lengths == pytest.approx([1.27] * 3)
     named = {"units.length": "mm", "leaf.length": 0.5 * pint.cm}
     assert leafdyn.Scenario(fan(3), named).lengths.tolist() == [5, 5, 5]
+    tables = {"units": {"length": "mm"}, "leaf": {"length": 0.5 * pint.cm}}
+    assert leafdyn.Scenario(fan(3), tables).lengths.tolist() == [5, 5, 5]
     turned = leafdyn.Scenario(scenario, {"leaf.fan": [0, 90, 180] * pint.degree})
     assert f"{np.pi}" in turned.overrides[-1]
 

@@ -54,13 +54,15 @@ class Scenario:
     def __init__(self, source: Source, set: Mapping[str, Any] | None = None) -> None:
         if set is not None and not isinstance(set, Mapping):
             raise TypeError(f'set = {set!r}: a dict is wanted, such as {{"leaf.rods": 5}}')
+        tables = [key for key, value in (set or {}).items() if replaces(key, value)]
+        set = dotted(set or {})
         if "pint" in sys.modules:
-            source, set = _without_units(source, set or {})
+            source, set = _without_units(source, set)
         kept: list[str] = []
-        for table in [key for key, value in (set or {}).items() if replaces(key, value)]:
+        for table in tables:
             source, others = _without_table(source, table)
             kept = [entry for entry in kept if not belongs(entry, table)] + others
-        entries = kept + (_leafdyn.overrides(dotted(set)) if set else [])
+        entries = kept + (_leafdyn.overrides(set) if set else [])
         if isinstance(source, Scenario):
             self._core = source._core.replaced(entries) if entries else source._core
         elif isinstance(source, Mapping):

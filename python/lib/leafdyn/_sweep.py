@@ -208,7 +208,8 @@ def _failures(rows: Sequence[Row]) -> str | None:
         why = f", {late} of them because the time was over" if late else ""
         said = [f"{len(failed)} of {len(rows)} leaves are not at rest within the tolerance{why}: see the column outcome"]
     if refused:
-        said.append(f"{len(refused)} of {len(rows)} leaves are refused, the first: {refused[0].remark}")
+        first = str(refused[0].remark).partition("\n")[0]
+        said.append(f"{len(refused)} of {len(rows)} leaves are refused, the first: {first}")
     return "; ".join(said) or None
 
 
@@ -219,8 +220,16 @@ class Samples(NamedTuple):
     """What is replaced in each, by keys."""
     columns: dict[str, list[Any]]
     """How that stands in the table: tables as their labels."""
-    index: Any
+    index: Any = None
     """That of the table; none where rows are counted."""
+    is_table: bool = False
+    """Whether they are the rows of a table."""
+
+    def place(self, number: int) -> str:
+        """Where a leaf stands, for messages."""
+        if self.is_table:
+            return f"row {number if self.index is None else self.index[number]}"
+        return "at " + ", ".join(f"{key} = {self.columns[key][number]}" for key in self.points[number])
 
 
 def _samples(vary: Any, units: Units) -> Samples:
@@ -232,18 +241,19 @@ def _samples(vary: Any, units: Units) -> Samples:
                 raise ValueError(f"vary: the column {key} is there {keys.count(key)} times: leave all but one out")
         cells = {key: plain(list(vary.iloc[:, at]), key, units) for at, key in enumerate(keys)}
         points = [dict(zip(keys, row)) for row in zip(*cells.values())] if keys else [{} for _ in range(len(vary))]
-        return Samples(points, {key: _labels(column) for key, column in cells.items()}, vary.index)
+        return Samples(points, {key: _labels(column) for key, column in cells.items()}, vary.index, True)
     if not isinstance(vary, (str, Mapping)) and isinstance(vary, Iterable):
         vary = list(vary)
         if vary and all(isinstance(row, Mapping) for row in vary):
             points = [{_joined(key): plain(value, _joined(key), units) for key, value in row.items()} for row in vary]
             every = dict.fromkeys(key for point in points for key in point)
-            return Samples(points, {key: _labels([point.get(key, nan) for point in points]) for key in every}, None)
+            columns = {key: _labels([point.get(key, nan) for point in points]) for key in every}
+            return Samples(points, columns, is_table=True)
     given: Mapping[Any, Any] = vary if isinstance(vary, Mapping) else spans(vary)
     axes = {_joined(keys): _axis(_joined(keys), span, units) for keys, span in given.items()}
     grid = list(product(*axes.values()))
     points = [{key: value for key, (_, value) in zip(axes, point)} for point in grid]
-    return Samples(points, {key: [point[at][0] for point in grid] for at, key in enumerate(axes)}, None)
+    return Samples(points, {key: [point[at][0] for point in grid] for at, key in enumerate(axes)})
 
 
 def _axis(key: str, span: Any, units: Units) -> list[tuple[Any, Any]]:
@@ -305,9 +315,8 @@ def _leaves(base: Scenario, samples: Samples, told: bool) -> list[Scenario | Ref
         try:
             leaves.append(Scenario(base, {key: value for keys, value in point.items() for key in keys.split("+")}))
         except (ValueError, TypeError) as refused:
-            place = ", ".join(f"{key} = {samples.columns[key][number]}" for key in point)
             unknown += [refused] if unknown_key(refused) else []
-            refused.args = (f"at {place}: {refused}",)
+            refused.args = (f"{samples.place(number)}: {refused}",)
             if not told:
                 raise
             leaves.append(RefusedLeaf(str(refused)))
