@@ -90,8 +90,10 @@ def test_all_numbers_and_entries_of_lists() -> None:
     slope = (ends[1] - ends[0]) / (2 * step)
     assert np.abs(slope - alone.sensitivities["leaf.fan[2]"].tip).max() < 1e-5
     # A word has no entries.
-    with pytest.raises(ValueError, match="leaf.fan: is a list"):
+    with pytest.raises(ValueError, match="leaf.fan: is 'paper' in the scenario: write its numbers there"):
         leafdyn.sensitivities(fan(3), "leaf.fan")
+    # Where points are is no number by which a leaf changes smoothly.
+    assert not any(".at" in key for key in leafdyn.sensitivities(leafdyn.example("across"), "all", modes=0).sensitivities)
     text = leafdyn.Scenario(fan(2)).text
     assert set(leafdyn.sensitivities(text, "all", modes=0).sensitivities) >= set(stiff)
 

@@ -530,12 +530,16 @@ def _is_numeric(value: Any) -> bool:
 
 def _without_refused(leaf: Scenario, words: list[str], message: str, every: bool) -> list[str]:
     """Keys for which to ask in place of those that were refused: of a list its entries; none if it stays refused."""
-    word, _, why = message.partition(": ")
-    if word not in words:
+    key, _, why = message.partition(": ")
+    # The program may name an entry of what was asked for.
+    word = next((word for word in words if _is_of(key, word.strip())), None)
+    if word is None:
         return []
     entries: list[str] = []
     if why.startswith("is a list: give an index"):
-        found = given(leaf.text, leaf.overrides).get(word)
+        found = given(leaf.text, leaf.overrides).get(word.strip())
+        if isinstance(found, str):
+            raise ValueError(f"{word}: is {found!r} in the scenario: write its numbers there, or leave this key out")
         entries = [f"{word}[{number}]" for number in range(len(found) if isinstance(found, list) else 0)]
     if not entries and not every:
         return []

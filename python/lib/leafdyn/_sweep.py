@@ -194,19 +194,19 @@ def sweep(
         else:
             one = partial(_row, wanted=wanted, kinds=kinds, asked=asked, told=told)
             rows = _gathered(client, client.map(one, leaves, batch_size=max(1, len(leaves) // 100), pure=False))
-    warn(base.name, _failures(rows))
+    warn(base.name, _failures(rows, "see" if "outcome" in wanted else "ask for"))
     return table(rows)
 
 
-def _failures(rows: Sequence[Row]) -> str | None:
-    """How many leaves are not at rest, and how many refused."""
+def _failures(rows: Sequence[Row], find: str) -> str | None:
+    """How many leaves are not at rest, and how many refused; `find` is how to come to the column that says more."""
     refused = [row for row in rows if row.outcome == REFUSED]
     failed = [row for row in rows if not row.success and row.outcome != REFUSED]
     late = sum(row.outcome == OUT_OF_TIME for row in failed)
     said = []
     if failed:
         why = f", {late} of them because the time was over" if late else ""
-        said = [f"{len(failed)} of {len(rows)} leaves are not at rest within the tolerance{why}: see the column outcome"]
+        said = [f"{len(failed)} of {len(rows)} leaves are not at rest within the tolerance{why}: {find} the column outcome"]
     if refused:
         first = str(refused[0].remark).partition("\n")[0]
         said.append(f"{len(refused)} of {len(rows)} leaves are refused, the first: {first}")
