@@ -50,10 +50,9 @@ def without(source: Mapping[str, Any], table: str) -> dict[str, Any]:
 
 def read(text: str) -> dict[str, Any]:
     """A scenario in TOML or JSON as a dict; of a result in JSON its input."""
-    return dict(_read(text))
+    return dict(_PARSED(text))
 
 
-@lru_cache(maxsize=8)
 def _read(text: str) -> Mapping[str, Any]:
     if text.lstrip("\ufeff \t\r\n").startswith("{"):
         found: dict[str, Any] = json.loads(text.lstrip("\ufeff"))
@@ -61,6 +60,10 @@ def _read(text: str) -> Mapping[str, Any]:
         return inner if isinstance(inner, dict) else found
     parsed: dict[str, Any] = _toml().loads(text.lstrip("\ufeff"))
     return parsed
+
+
+_PARSED = lru_cache(maxsize=8)(_read)
+"""The texts that were parsed last: a sweep replaces tables of one text over and over."""
 
 
 def _toml() -> Any:
