@@ -340,6 +340,12 @@ impl Leaf {
         self.scenario.wind.is_some()
     }
 
+    /// Whether a wind blows at the beginning: air that is at rest damps no small motion.
+    pub fn in_moving_air(&self) -> bool {
+        let wind = self.scenario.wind.as_ref();
+        wind.is_some_and(|wind| wind.velocity.at(0.0) != [0.0; 3])
+    }
+
     /// The leaf with its tips apart and without the coupling of its veins; each tip bears an equal
     /// part of the force on the joint one. Tissue, which has no force between veins in their rest
     /// shapes, still ties them.

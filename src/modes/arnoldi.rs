@@ -1,9 +1,13 @@
 //! The Arnoldi method for the eigenvalues of largest size of an unsymmetric matrix that is known by its
 //! products (W. E. Arnoldi, Quart. Appl. Math. 9, 1951), from several starts at once: so many equal
-//! eigenvalues are found.
+//! eigenvalues are found. The small matrices to which that leads, and others that are dense, are solved by
+//! Francis's iteration.
 
 use crate::run::Limit;
-use faer::{Mat, c64};
+use faer::diag::Diag;
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::evd::{ComputeEigenvectors, EvdParams, evd_real, evd_scratch};
+use faer::{Auto, Mat, Par, Spec, c64};
 
 /// The search for eigenvalues.
 struct ArnoldiSearch {
@@ -131,12 +135,11 @@ impl RitzValue {
 fn ritz_values(columns: &[Vec<f64>], size: usize) -> Option<Vec<RitzValue>> {
     let done = columns.len();
     let entry = |r: usize, c: usize| columns[c].get(r).copied().unwrap_or(0.0);
-    let eigen = Mat::from_fn(done, done, entry).eigen().ok()?;
-    let (vectors, values) = (eigen.U(), eigen.S().column_vector());
+    let DenseEigenpairs { values, vectors } = dense_eigenpairs(&Mat::from_fn(done, done, entry))?;
     let mut found: Vec<RitzValue> = (0..done)
         .filter(|&k| values[k].norm() > 0.0)
         .map(|k| {
-            let vector: Vec<c64> = (0..done).map(|c| vectors[(c, k)]).collect();
+            let vector = eigenvector_of(&values, &vectors, k);
             let length = vector.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
             let vector: Vec<c64> = vector.into_iter().map(|v| v / length).collect();
             let beyond = (done..size).map(|r| {
@@ -152,4 +155,67 @@ fn ritz_values(columns: &[Vec<f64>], size: usize) -> Option<Vec<RitzValue>> {
         .collect();
     found.sort_by(|a, b| b.eigenvalue.norm().total_cmp(&a.eigenvalue.norm()));
     Some(found)
+}
+
+/// The eigenvalues of a dense matrix, and its eigenvectors as columns: of a conjugate pair the real parts, then
+/// the imaginary ones.
+struct DenseEigenpairs {
+    values: Vec<c64>,
+    vectors: Mat<f64>,
+}
+
+/// The eigenvector of the eigenvalue `k`.
+fn eigenvector_of(values: &[c64], vectors: &Mat<f64>, k: usize) -> Vec<c64> {
+    let column = |c: usize| (0..vectors.nrows()).map(move |r| vectors[(r, c)]);
+    match values[k].im {
+        0.0 => column(k).map(|re| c64::new(re, 0.0)).collect(),
+        im => {
+            let (first, sign) = if im > 0.0 { (k, 1.0) } else { (k - 1, -1.0) };
+            let parts = column(first).zip(column(first + 1));
+            parts.map(|(re, im)| c64::new(re, sign * im)).collect()
+        }
+    }
+}
+
+/// Francis's iteration with two shifts. That with many, for large matrices, may go on for ever where many
+/// eigenvalues are equal but for rounding.
+fn francis_iteration() -> Spec<EvdParams, f64> {
+    let mut parameters = <EvdParams as Auto<f64>>::auto();
+    parameters.schur.blocking_threshold = usize::MAX;
+    parameters.into()
+}
+
+/// The eigenvalues of a dense matrix; `None` if the iteration does not converge.
+pub fn dense_eigenvalues(matrix: &Mat<f64>) -> Option<Vec<c64>> {
+    dense_eigenvalues_into(matrix, None)
+}
+
+fn dense_eigenpairs(matrix: &Mat<f64>) -> Option<DenseEigenpairs> {
+    let mut vectors = Mat::zeros(matrix.nrows(), matrix.nrows());
+    let values = dense_eigenvalues_into(matrix, Some(&mut vectors))?;
+    Some(DenseEigenpairs { values, vectors })
+}
+
+fn dense_eigenvalues_into(matrix: &Mat<f64>, vectors: Option<&mut Mat<f64>>) -> Option<Vec<c64>> {
+    let size = matrix.nrows();
+    let wanted = match vectors.is_some() {
+        true => ComputeEigenvectors::Yes,
+        false => ComputeEigenvectors::No,
+    };
+    let (none, parameters) = (ComputeEigenvectors::No, francis_iteration());
+    let room = evd_scratch::<f64>(size, none, wanted, Par::Seq, parameters);
+    let (mut re, mut im) = (Diag::zeros(size), Diag::zeros(size));
+    evd_real(
+        matrix.as_ref(),
+        re.as_mut(),
+        im.as_mut(),
+        None,
+        vectors.map(|it| it.as_mut()),
+        Par::Seq,
+        MemStack::new(&mut MemBuffer::new(room)),
+        parameters,
+    )
+    .ok()?;
+    let parts = (0..size).map(|k| c64::new(re.column_vector()[k], im.column_vector()[k]));
+    Some(parts.collect())
 }

@@ -21,7 +21,7 @@
 use crate::krylov::{KrylovLimits, solve_minimal_residual};
 use crate::leaf::{DirectSolver, DiscreteLeaf, MatrixFactors, NodalField, State, System};
 use crate::modes::MassMatrix;
-use crate::modes::arnoldi::{RitzPairs, RitzValue, largest_eigenvalues};
+use crate::modes::arnoldi::{RitzPairs, RitzValue, dense_eigenvalues, largest_eigenvalues};
 use crate::modes::node_blocks::NodeBlocks;
 use crate::motion::Physics;
 use crate::newton::FollowerForces;
@@ -234,7 +234,7 @@ pub fn states_per_node(leaf: &DiscreteLeaf, physics: &Physics) -> usize {
             inertia.tensor(DQuat::IDENTITY) != DMat3::ZERO
         });
     let unknowns = if rotates { 6 } else { 3 };
-    match leaf.leaf.in_wind() || physics.retardation > 0.0 {
+    match leaf.leaf.in_moving_air() || physics.retardation > 0.0 {
         true => 2 * unknowns,
         false => unknowns,
     }
@@ -242,7 +242,7 @@ pub fn states_per_node(leaf: &DiscreteLeaf, physics: &Physics) -> usize {
 
 /// The eigenvalues of a dense matrix that are not zero by rounding, the largest first.
 fn nonzero_eigenvalues(matrix: &Mat<f64>) -> Option<Vec<c64>> {
-    let mut all = matrix.eigenvalues().ok()?;
+    let mut all = dense_eigenvalues(matrix)?;
     all.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     let largest = all.first()?.norm();
     all.retain(|value| value.norm() > DENSE_ROUNDING * largest);
@@ -429,7 +429,7 @@ impl<'a> LinearizedMotion<'a> {
 
     /// Whether there is damping that is not proportional to the masses.
     pub(super) fn is_damped_beside_masses(&self) -> bool {
-        self.stiffened.is_some() || self.leaf.leaf.in_wind()
+        self.stiffened.is_some() || self.leaf.leaf.in_moving_air()
     }
 
     /// A vector as increments of the nodes.

@@ -212,6 +212,17 @@ impl TissueStrip {
         }
     }
 
+    /// A strip in the same place that has no force.
+    pub fn without_stiffness(&self) -> TissueStrip {
+        TissueStrip {
+            stiffness: DVec3::ZERO,
+            condensing: DVec3::ZERO,
+            fold_stiffness: 0.0,
+            contraction: 0.0,
+            ..*self
+        }
+    }
+
     /// Adds `times` the data of another strip.
     pub fn add(&mut self, times: f64, other: &TissueStrip) {
         self.stiffness += times * other.stiffness;

@@ -305,7 +305,7 @@ fn read_landing(entries: &Entries, row: usize) -> ScenarioResult<Option<Landing>
     let (from, velocity) = (begins.number()?, moves.vector()?);
     moves.refuse_unless(
         from > 0.0 || velocity == [0.0; 3],
-        "belongs to a mass that lands: add from, the time at which it does, greater than 0",
+        "belongs to a mass that lands: give from, the time at which it does, a number greater than 0",
     )?;
     let mass = item(Key::PointMass)?.number()?;
     begins.refuse_unless(

@@ -3,7 +3,7 @@
 
 use crate::run::remarks;
 use crate::scenario::checked::Scenario;
-use crate::scenario::loads::Dynamics;
+use crate::scenario::loads::{Dynamics, PolarInertia};
 use crate::scenario::supports::Clamp;
 use crate::scenario::veins::Rod;
 use glam::DVec3;
@@ -29,6 +29,8 @@ struct PlausibleRanges {
     /// Angles beyond a right angle that are whole numbers are degrees, and so are twists of more than
     /// a turn that are multiples of this.
     degree_multiple: f64,
+    /// Difference from a right angle that is one of digits left out.
+    upright_tolerance: f64,
 }
 
 const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
@@ -38,6 +40,7 @@ const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
     weight_contradiction: 10.0,
     weight_tolerance: 0.01,
     degree_multiple: 15.0,
+    upright_tolerance: 1e-3,
 };
 
 /// A unit of length, and the acceleration of gravity in it per second squared.
@@ -85,6 +88,24 @@ remarks! {
             /// Its value.
             angle: f64,
         } = "angle-in-degrees",
+        /// A leaf that is upright but for the digits of its angle.
+        #[error(
+            "leaf.elevation is {angle}, a right angle but for {}, and the leaf leans so much: a leaf that is exactly upright, whose critical load can be traced, has {}",
+            four_digits(.angle.abs() - FRAC_PI_2), FRAC_PI_2.copysign(*.angle)
+        )]
+        NearlyUpright {
+            /// Its elevation.
+            angle: f64,
+        } = "nearly-upright",
+        /// Rotary inertia that is not given, of veins with a mass.
+        #[error(
+            "dynamics.density is given without a rotary inertia: frequencies and motions are those of veins with sections {} in radius, a fifth of the length; dynamics.section_radius gives the radius that they have",
+            four_digits(*.radius)
+        )]
+        AssumedRotaryInertia {
+            /// The radius of a round section with the rotary inertia that is assumed.
+            radius: f64,
+        } = "assumed-rotary-inertia",
         /// A section with a side longer than its vein.
         #[error(
             "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
@@ -282,11 +303,13 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
     let angles = [
         fan_angles_in_degrees(scenario),
         clamp_angle_in_degrees(scenario),
+        nearly_upright(scenario),
     ];
     let materials = [
         denser_than_anything(scenario),
         lighter_than_air(scenario),
         stiffer_than_diamond(scenario),
+        assumed_rotary_inertia(scenario),
     ];
     let all = angles.into_iter().chain(lengths).chain(materials);
     all.flatten().collect()
@@ -374,6 +397,30 @@ fn clamp_angle_in_degrees(scenario: &Scenario) -> Option<PlausibilityWarning> {
         .iter()
         .find_map(|clamp| angle(clamp).or_else(|| twist(clamp)))?;
     Some(PlausibilityWarning::AngleInDegrees { key, angle })
+}
+
+/// An elevation that differs from a right angle by rounding of its digits.
+fn nearly_upright(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let angle = match &scenario.blade {
+        Some(blade) => blade.elevation,
+        None => scenario.rods.first()?.elevation,
+    };
+    let apart = (angle.abs() - FRAC_PI_2).abs();
+    (apart > 0.0 && apart < PLAUSIBLE.upright_tolerance)
+        .then_some(PlausibilityWarning::NearlyUpright { angle })
+}
+
+/// The rotary inertia that veins without a section have, where masses are real ones.
+fn assumed_rotary_inertia(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let given = &scenario.dynamics;
+    let assumed = given.polar_inertia == PolarInertia::Same
+        && given.density != Dynamics::default_for(&scenario.rods).density;
+    let real = assumed && scenario.units.is_in_seconds();
+    let density = given.density.first()?.at(0.0);
+    let inertia = given.rotary_inertia.first()?[0].at(0.0);
+    real.then_some(PlausibilityWarning::AssumedRotaryInertia {
+        radius: 2.0 * (inertia / density).sqrt(),
+    })
 }
 
 /// A section with a side longer than its vein.
@@ -642,6 +689,56 @@ mod tests {
             assert_eq!(said, [wanted]);
         }
         assert_eq!(doubts(1.2), []);
+    }
+
+    /// A column whose angle has five digits leans, and has no critical load.
+    #[test]
+    fn a_column_that_leans_by_the_digits_of_its_angle_is_doubted() {
+        let doubts = |elevation: &str| {
+            let text = format!(
+                r#"
+                leaf = {{ rods = 1, length = 1.0, fan = [0.0], elevation = {elevation} }}
+                section = {{ shape = "circle", diameter = 0.01, young = 1e9 }}"#
+            );
+            plausibility_warnings(&Scenario::from_toml(&text).unwrap())
+        };
+        for angle in ["1.5708", "-1.5708", "1.57"] {
+            let said = doubts(angle);
+            let angle = angle.parse().unwrap();
+            assert_eq!(said, [PlausibilityWarning::NearlyUpright { angle }]);
+        }
+        for angle in ["1.5707963267948966", "-1.5707963267948966", "1.56", "0.0"] {
+            assert_eq!(doubts(angle), [], "{angle}");
+        }
+        let said = doubts("1.5708")[0].to_string();
+        assert!(said.contains("1.5707963267948966"), "{said}");
+    }
+
+    /// Real masses have real sections: those that are assumed are a fifth of the length in radius.
+    #[test]
+    fn a_rotary_inertia_that_is_assumed_is_doubted() {
+        let doubts = |time: &str, dynamics: &str| {
+            let text = format!(
+                r#"
+                units = {{ length = "cm", force = "N"{time} }}
+                leaf = {{ rods = 1, length = 12.0, fan = [0.0] }}
+                stiffness = {{ torsion = 0.2, bending_2 = 0.2, bending_3 = 0.2, axial = inf, shear_2 = inf, shear_3 = inf }}
+                dynamics = {{ {dynamics} }}"#
+            );
+            plausibility_warnings(&Scenario::from_toml(&text).unwrap())
+        };
+        let seconds = ", time = \"s\"";
+        let density = "density = 7.5e-7";
+        let [PlausibilityWarning::AssumedRotaryInertia { radius }] = doubts(seconds, density)[..]
+        else {
+            panic!("{:?}", doubts(seconds, density))
+        };
+        assert!((radius - 2.4).abs() < 1e-12, "{radius}");
+        for given in ["section_radius = 0.1", "rotary_inertia = 1e-9"] {
+            assert_eq!(doubts(seconds, &format!("{density}, {given}")), []);
+        }
+        assert_eq!(doubts("", density), []);
+        assert_eq!(doubts("", ""), []);
     }
 
     /// Materials in other units than those of the scenario: 0.8 g/cm³ and 500 MPa as they stand, in cm and N.

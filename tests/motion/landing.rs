@@ -393,7 +393,7 @@ fn masses_that_make_no_sense_are_refused() {
     for (set, why) in [
         (
             "load.point[0].from=0",
-            "add from, the time at which it does",
+            "give from, the time at which it does",
         ),
         ("load.point[0].mass=0", "add mass, greater than 0"),
         ("load.point[0].from=-1", "must not be negative"),

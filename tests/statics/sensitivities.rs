@@ -410,6 +410,42 @@ fn they_are_those_of_whole_relaxations() {
     assert!(elsewhere.len() <= 2, "{elsewhere:?}");
 }
 
+/// Tissue that there is not yet has a derivative at zero, of veins whose rest shapes do not depend on it.
+#[test]
+fn tissue_begins_at_zero() {
+    let text = r#"
+        leaf = { rods = 4, fan = [-0.5, -0.1, 0.2, 0.6], length = [0.9, 1.0, 1.1, 1.0], elevation = 0.3 }
+        stiffness = { torsion = 0.7, bending_2 = 1.0, bending_3 = 2.0, axial = 300.0, shear_2 = 90.0, shear_3 = 80.0 }
+        load.gravity = [0.2, 0.3, -1.5]
+        load.point = [{ vein = 2, at = 0.5, force = [2.0, 0.0, -1.0] }, { vein = 3, at = 0.6, force = [-2.0, 0.5, 0.0] }]"#;
+    let wanted = [
+        "tissue.along",
+        "tissue.across",
+        "tissue.normal",
+        "tissue.fold",
+    ];
+    for joined in ["true", "false"] {
+        let base = base(text, &format!("leaf.joined = {joined}"));
+        let options = with_modes(2, iterated(1e-11, 12));
+        let (leaf, found) = derivatives(&base, &wanted, &options);
+        let (_, count) = results(&leaf);
+        for (key, found) in keys(&wanted).iter().zip(&found) {
+            let (ours, theirs) = (of(found), differenced(&base, key, &options));
+            assert_eq!(ours.len(), theirs.len(), "{key}");
+            let largest = theirs[..count].iter().map(|it| it.0.abs());
+            assert!(largest.fold(0.0, f64::max) > 1e-5, "{key} does nothing");
+            for (k, (ours, (theirs, _))) in ours.iter().zip(&theirs).enumerate() {
+                let error = (ours - theirs).abs() / theirs.abs().max(1.0);
+                let allowed = if k < count { 2e-7 } else { 2e-6 };
+                assert!(
+                    error < allowed,
+                    "{joined} {key}, result {k}: {ours} {theirs}"
+                );
+            }
+        }
+    }
+}
+
 /// Over several grids they are as accurate as they say, by one solution for each
 /// number or for each result.
 #[test]

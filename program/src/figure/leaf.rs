@@ -86,7 +86,10 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
     let view = ViewAngles::telling_apart(&shapes);
     let count = shown.len();
     let panels = SmallPanels::seen_from(view, shapes.iter(), count, &setting, PAGE.header);
-    let name = format!("{}: equilibria, lowest energy first", all.scenario);
+    let name = format!(
+        "{}: equilibria with their energies, lowest first",
+        all.scenario
+    );
     let count = all.found.len();
     let mut notes = vec![format!("{count} found from {} starts", all.starts)];
     if count > MOST_EQUILIBRIA_DRAWN {
@@ -100,12 +103,11 @@ pub fn draw_equilibria(all: &Equilibria, scenario: &Scenario) -> Drawing {
         let energy = found.equilibrium.energy.filter(|energy| energy.is_finite());
         let energy = energy.map(|energy| {
             let digits = format_as_accurate(&found.equilibrium, energy, energy);
-            format!(
-                "energy {}, ",
-                number_in_unit(digits, &scenario.units, ENERGY)
-            )
+            number_in_unit(digits, &scenario.units, ENERGY)
         });
-        let text = energy.unwrap_or_default() + &stability;
+        let parts = [stability, energy.unwrap_or_default()];
+        let told = parts.into_iter().filter(|it| !it.is_empty());
+        let text = told.collect::<Vec<_>>().join(", ");
         drawing.draw_group("leaf", |page| {
             panels.draw_leaf(page, index, veins, [&(index + 1).to_string(), &text]);
         });

@@ -45,7 +45,8 @@ const LAYOUT: BarLayout = BarLayout {
 /// Values are shown to this part of them.
 const SHOWN_VALUE_PRECISION: f64 = 5e-3;
 
-/// By how much each number changes: this part of it or, if it is zero, of its unit.
+/// By how much each number changes: this part of it or, if it is zero, of the largest of its list or
+/// profile, and of its unit if all are zero.
 const RELATIVE_CHANGE: f64 = 0.01;
 
 /// What a change of one number of the scenario does.
@@ -58,18 +59,24 @@ struct SensitivityRow {
 }
 
 impl SensitivityRow {
-    fn from_sensitivity(found: &Sensitivity, units: &Units) -> Self {
+    /// The row of a number of a list or profile whose largest has this magnitude.
+    fn from_sensitivity(found: &Sensitivity, largest: f64, units: &Units) -> Self {
         let number = QuantityLabel::from_keys(&found.key, units);
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
+        let hundredth_of = |value: f64| {
+            let by = format!("by 1 % of {}{unit}", format_four_digits(value));
+            (RELATIVE_CHANGE * value, by)
+        };
         let (factor, by) = match found.value {
+            0.0 if largest > 0.0 => {
+                let (factor, by) = hundredth_of(largest);
+                (factor, format!("0, {by}"))
+            }
             0.0 => (
                 RELATIVE_CHANGE,
                 format!("0, by {}{unit}", format_four_digits(RELATIVE_CHANGE)),
             ),
-            value => {
-                let value = format!("{}{unit}", format_four_digits(value));
-                (RELATIVE_CHANGE * found.value, format!("by 1 % of {value}"))
-            }
+            value => hundredth_of(value),
         };
         let (change, error) = match &found.reaction {
             Some(reaction) => (reaction.force, found.tip_reaction_error),
@@ -99,12 +106,21 @@ impl SensitivityRow {
     }
 }
 
+/// The largest magnitude of the numbers of the list or profile of this one.
+fn largest_beside(found: &[Sensitivity], number: &Sensitivity) -> f64 {
+    let list = |it: &Sensitivity| it.key.rfind('[').map(|end| it.key[..end].to_string());
+    let own = list(number);
+    let beside = found.iter().filter(|it| own.is_some() && list(it) == own);
+    let magnitudes = beside.map(|it| it.value.abs());
+    magnitudes.filter(|it| it.is_finite()).fold(0.0, f64::max)
+}
+
 pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let found = leaf.sensitivities.as_deref().unwrap_or_default();
     let units = &scenario.units;
     let mut rows: Vec<SensitivityRow> = found
         .iter()
-        .map(|it| SensitivityRow::from_sensitivity(it, units))
+        .map(|it| SensitivityRow::from_sensitivity(it, largest_beside(found, it), units))
         .collect();
     rows.sort_by(|a, b| b.change_length().total_cmp(&a.change_length()));
     rows.truncate(LAYOUT.most_rows);
@@ -267,6 +283,7 @@ mod tests {
             ("stiffness.bending_2", 1.0, [0.0, 1e-9, 0.5]),
             ("load.gravity[2]", -1.0, [0.0, -1e-7, 0.25]),
             ("load.gravity[1]", 0.0, [0.0, 0.0, 0.0]),
+            ("coupling.y", 0.0, [0.0, 0.0, 0.0]),
         ]);
         let bars = |color: &str| svg.matches(&format!("fill=\"{color}\"")).count();
         // Up along z, and down: by a hundredth of a negative number.
@@ -274,6 +291,7 @@ mod tests {
         for part in [
             ">bending stiffness A2<",
             ">by 1 % of 1 N cm²<",
+            ">0, by 1 % of 1 N/cm<",
             ">0, by 0.01 N/cm<",
             ">5<",
             ">\u{2212}2.5<",

@@ -351,6 +351,7 @@ fn draw_branches(
         quantity_axis(trace, quantity),
     );
     let mut labels = LabelPlacement::in_rectangle(cell);
+    let mut dashed = Vec::new();
     for (b, branch) in trace.branches.iter().enumerate() {
         let origin = branch.from.map(|[b, p]| &trace.branches[b].points[p]);
         let points: Vec<&TracePoint> = origin.into_iter().chain(&branch.points).collect();
@@ -370,6 +371,10 @@ fn draw_branches(
                     }
                 })
                 .collect();
+            let piece = match stable {
+                true => piece,
+                false => not_yet_drawn(&piece, &mut dashed),
+            };
             axes.draw_clipped_line(page, &piece, stroke);
             begun += segments;
         }
@@ -394,6 +399,56 @@ fn draw_branches(
         }
     }
     labels.draw_requested(page);
+}
+
+/// Distances along and across a line, in pixels.
+struct DashLayout {
+    /// A line runs along another one up to this distance.
+    apart: f64,
+    /// A line is compared with what is so far behind on itself.
+    behind: f64,
+}
+
+const DASHES: DashLayout = DashLayout {
+    apart: 0.8,
+    behind: 20.0,
+};
+
+/// The parts of a line that do not run along one of the `drawn` segments, or back along the line itself,
+/// as mirror images do: dashes on dashes would look like a solid line. Adds those parts to the drawn ones.
+fn not_yet_drawn(line: &[Option<DVec2>], drawn: &mut Vec<[DVec2; 2]>) -> Vec<Option<DVec2>> {
+    let near = |point: DVec2, [from, to]: [DVec2; 2]| {
+        let along = to - from;
+        let part = (point - from).dot(along) / along.length_squared().max(f64::MIN_POSITIVE);
+        point.distance(from + part.clamp(0.0, 1.0) * along) < DASHES.apart
+    };
+    let mut shown = vec![line.first().copied().flatten()];
+    // Segments of the line and how far along it they end, and how many are already among the drawn ones.
+    let mut own: Vec<([DVec2; 2], f64)> = Vec::new();
+    let (mut gone, mut settled) = (0.0, 0);
+    for pair in line.windows(2) {
+        let [Some(from), Some(to)] = [pair[0], pair[1]] else {
+            shown.push(pair[1]);
+            continue;
+        };
+        while own
+            .get(settled)
+            .is_some_and(|it| it.1 < gone - DASHES.behind)
+        {
+            drawn.push(own[settled].0);
+            settled += 1;
+        }
+        let known = |point: DVec2| drawn.iter().any(|it| near(point, *it));
+        if [from, from.midpoint(to), to].into_iter().all(known) {
+            shown.extend([None, Some(to)]);
+        } else {
+            shown.push(Some(to));
+            own.push(([from, to], gone + from.distance(to)));
+        }
+        gone += from.distance(to);
+    }
+    drawn.extend(own.into_iter().skip(settled).map(|it| it.0));
+    shown
 }
 
 /// Draws the key: the branches, and the kinds of points that occur.
@@ -550,4 +605,43 @@ fn draw_force_displacement_line(
         format_four_digits(100.0 * law.deviation)
     );
     key.add_entry(page, &format!("R² = {:.6}", law.r_squared), &off, |_, _| ());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn length(line: &[Option<DVec2>]) -> f64 {
+        let pieces = line.windows(2);
+        let pieces = pieces.filter_map(|pair| Some(pair[0]?.distance(pair[1]?)));
+        pieces.sum()
+    }
+
+    /// There and back, and along another line: drawn once. Beside it, and across it: drawn.
+    #[test]
+    fn dashes_are_not_drawn_over_dashes() {
+        let arc = |shift: DVec2| {
+            (0..=60).map(move |k| {
+                let (sin, cos) = (0.025 * f64::from(k)).sin_cos();
+                Some(200.0 * DVec2::new(cos, sin) + shift)
+            })
+        };
+        let once: Vec<_> = arc(DVec2::ZERO).collect();
+        let and_back: Vec<_> = arc(DVec2::ZERO).chain(arc(DVec2::ZERO).rev()).collect();
+        let mut drawn = Vec::new();
+        let shown = length(&not_yet_drawn(&and_back, &mut drawn));
+        // Where it turns it is not told from itself yet.
+        assert!(
+            (shown - length(&once)).abs() < 2.0 * DASHES.behind,
+            "{shown}"
+        );
+        assert_eq!(length(&not_yet_drawn(&once, &mut drawn)), 0.0);
+        for line in [
+            arc(DVec2::new(2.0, 2.0)).collect::<Vec<_>>(),
+            vec![Some(DVec2::ZERO), Some(DVec2::splat(300.0))],
+        ] {
+            let all = length(&line);
+            assert_eq!(length(&not_yet_drawn(&line, &mut drawn.clone())), all);
+        }
+    }
 }

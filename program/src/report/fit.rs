@@ -22,6 +22,9 @@ impl ReportedResult for Fit {
 
     fn report_lines(&self, units: &Units) -> LabelledLines {
         let found = match self.outcome {
+            FitOutcome::Converged if self.parameters.iter().any(hardly_determined) => {
+                "a minimum; the data determine every free number within a factor of ten, but not within two"
+            }
             FitOutcome::Converged => "a minimum; the data determine every free number",
             FitOutcome::Undetermined => "a minimum; the data do not determine every free number",
             FitOutcome::Systematic => {
@@ -92,6 +95,12 @@ fn data_file_line(file: &DataFile) -> String {
         .chain(said)
         .collect();
     said.join("; ")
+}
+
+/// Whether the ends of the interval of a number that is determined are more than a factor of four apart.
+fn hardly_determined(parameter: &FitParameter) -> bool {
+    let ends = parameter.low.zip(parameter.high);
+    ends.is_some_and(|(low, high)| low > 0.0 && high > 4.0 * low)
 }
 
 fn parameter_line(parameter: &FitParameter, outcome: FitOutcome, units: &Units) -> String {

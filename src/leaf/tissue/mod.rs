@@ -319,30 +319,31 @@ impl DiscreteLeaf {
 
     /// Calls `add` with the changes of the loads of all tissue by a change of the leaf, the weighted sum over
     /// leaves that differ, in a fixed state; returns the change of the energy. What is rigid has no change of
-    /// its force.
+    /// its force; what a leaf does not have is soft.
     pub(in crate::leaf) fn for_each_tissue_change(
         &self,
         state: &State,
         each: &[(f64, &DiscreteLeaf)],
         mut add: impl FnMut(usize, usize, Wrench),
     ) -> f64 {
-        let Some((_, first)) = each.first() else {
+        let with_tissue = each.iter().find(|(_, leaf)| leaf.has_tissue());
+        let Some((_, first)) = with_tissue else {
             return 0.0;
         };
         let mut energy = 0.0;
         for own in first.each_node_strip() {
             let (g, i) = (own.gap, own.node);
             let k = first.strip_index(own.place, g, i);
+            let soft = own.strip.without_stiffness();
             let mut change = TissueStrip::default();
             for (weight, leaf) in each {
-                change.add(*weight, &leaf.strips[k].difference_from(own.strip));
+                let strip = leaf.strips.get(k).unwrap_or(&soft);
+                change.add(*weight, &strip.difference_from(own.strip));
             }
             if change == TissueStrip::default() {
                 continue;
             }
-            let Some(strip) = self.strip(own.place, g, i) else {
-                continue;
-            };
+            let strip = self.strip(own.place, g, i).unwrap_or(&soft);
             let loads = strip.parameter_derivative(&strip_ends(state, g, i), &change);
             energy += loads.energy;
             for (rod, load) in [g, g + 1].into_iter().zip(loads.on_nodes) {

@@ -62,6 +62,15 @@ impl Units {
     pub fn unit_name(&self, dimension: Dimension) -> Option<String> {
         let names = [&self.force, &self.length, &self.time];
         let [length, force, time] = dimension;
+        if self.is_si() && (force, time) == (1, 2) {
+            return Some(match length + 1 {
+                0 => "kg".into(),
+                1 => "kg m".into(),
+                -1 => "kg/m".into(),
+                power @ 1.. => format!("kg m{}", superscript(power)),
+                power => format!("kg/m{}", superscript(-power)),
+            });
+        }
         let powers = [force, length, time];
         let mut factors = [Vec::new(), Vec::new()];
         for (name, power) in names.into_iter().zip(powers) {
@@ -85,6 +94,11 @@ impl Units {
             1 => Some(format!("{above}/{}", below[0])),
             _ => Some(format!("{above}/({})", below.join(" "))),
         }
+    }
+
+    /// Whether lengths are in metres, forces in newtons and times in seconds.
+    fn is_si(&self) -> bool {
+        self.meters() == Some(1.0) && self.newtons() == Some(1.0) && self.is_in_seconds()
     }
 
     /// The unit of energies and moments, if those of forces and lengths are named.
@@ -170,6 +184,13 @@ mod tests {
         assert_eq!(units.unit_name([-1, -1, 0]).unwrap(), "1/(N cm)");
         assert_eq!(units.frequency().unwrap(), "Hz");
         assert_eq!(units.grams(), Some(1e5));
+        let si = Units {
+            length: Some("m".into()),
+            ..units.clone()
+        };
+        // Mass, its moment of inertia, and mass per length, area and volume.
+        let masses = [-1, 1, -2, -3, -4].map(|length| si.unit_name([length, 1, 2]).unwrap());
+        assert_eq!(masses, ["kg", "kg m²", "kg/m", "kg/m²", "kg/m³"]);
         let without = Units {
             time: None,
             ..units

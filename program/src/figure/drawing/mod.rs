@@ -342,6 +342,9 @@ impl PageRectangle {
     }
 }
 
+/// From the letter of a panel to its text, in pixels.
+const LETTER_WIDTH: f64 = 24.0;
+
 /// A panel's title: its letter, and a text in a color.
 #[derive(Clone, Copy)]
 pub struct PanelCaption<'t> {
@@ -358,7 +361,12 @@ impl PanelCaption<'_> {
             page.draw_label(at, text, FONT_SIZE.text, TextAnchor::Start, color);
         };
         label(base, self.letter, TEXT_COLOR);
-        label(base + DVec2::new(24.0, 0.0), self.text, self.color);
+        label(base + DVec2::new(LETTER_WIDTH, 0.0), self.text, self.color);
+    }
+
+    /// The room for its text above a panel, in a row of panels that are this far apart.
+    pub fn text_room(pitch: f64) -> f64 {
+        pitch - LETTER_WIDTH - FONT_SIZE.text
     }
 }
 

@@ -700,6 +700,12 @@ impl<'s> SmallPanels<'s> {
         caption: PanelCaption,
     ) -> SpacePanel<'s> {
         let cell = self.panel_rectangle(index);
+        let room = PanelCaption::text_room(cell.size.x + SMALL_PANEL.gap);
+        let text = Font::embedded().shorten_text(caption.text, FONT_SIZE.text, room);
+        let caption = PanelCaption {
+            text: &text,
+            ..caption
+        };
         caption.draw(page, cell.corner);
         let (bounds, setting, step) = (self.bounds, self.setting, Some(self.grid_step));
         let scene = SpacePanel::new(bounds, setting, view, cell, SMALL_PANEL.margins, step);
