@@ -44,6 +44,10 @@ const INVERSE_LIMITS: KrylovLimits = KrylovLimits {
 /// Largest residual of the inverse, which rounding may leave above its accuracy.
 const LARGEST_INVERSE_RESIDUAL: f64 = 1e-8;
 
+/// Accuracy to which roots are computed on a grid, as a part of them. Of random leaves with damping it was 1e-7 where two
+/// roots nearly meet: growth below it is not told from none.
+pub const ROOT_ACCURACY: f64 = 2e-7;
+
 /// Largest number of states of which all roots are computed: about a second.
 pub const MOST_DENSE_STATES: usize = 600;
 

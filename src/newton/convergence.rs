@@ -230,6 +230,14 @@ impl ForceConvergence {
         }
     }
 
+    /// Whether forces still approach their values while the nodes are at rest: where rods and tissue that are rigid bear
+    /// forces against each other, each step of the law closes a part of what is missing, and not all of it.
+    pub fn converges_linearly(&self) -> bool {
+        self.is_indeterminate
+            && self.increment < INCREMENTS.neutral_step
+            && self.change < self.previous
+    }
+
     /// Whether the error that remains in the forces is at most this part of the largest, or
     /// rounding.
     pub fn has_converged(&self, accuracy: f64) -> bool {

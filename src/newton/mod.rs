@@ -271,11 +271,14 @@ impl NewtonEquations<'_> {
     }
 }
 
+/// Largest number of iterations of a leaf whose nodes are at rest, and whose forces converge linearly.
+const MOST_FORCE_ITERATIONS: usize = 300;
+
 /// The parameters of a Newton iteration.
 pub struct NewtonIteration<'a> {
     /// Accuracy of positions and rotations (lengths, radians).
     pub accuracy: f64,
-    /// Largest number of iterations.
+    /// Largest number of iterations, unless only forces are still to converge.
     pub iterations: usize,
     pub work: &'a mut SolverCounts,
     /// Receives the size of every step.
@@ -319,7 +322,10 @@ impl NewtonIteration<'_> {
         let mut forces = ForceConvergence::new(leaf);
         let mut next = state.clone();
         let (mut previous, mut previous_tolerance) = (f64::INFINITY, f64::INFINITY);
-        for step in 0..self.iterations {
+        for step in 0..MOST_FORCE_ITERATIONS.max(self.iterations) {
+            if step >= self.iterations && !forces.converges_linearly() {
+                break;
+            }
             let turn = leaf.assemble(state, system).largest_turn;
             if !linear.is_proximal() {
                 leaf.add_phase_conditions(state, system);

@@ -28,7 +28,8 @@ use glam::DVec3;
 /// a round rod, may differ by it. Where flutter begins it grows as the root of the distance from there.
 const PAIR_ROUNDING: f64 = 1e-6;
 
-/// Growth of a damped motion, as a part of the size of its root, that is rounding.
+/// Growth of a damped motion, as a part of the size of its root, from which on it is followed to where it begins: less than
+/// the accuracy of a root, as that is interpolated from several.
 const GROWTH_ROUNDING: f64 = 1e-8;
 
 /// A small motion that grows, on one grid.

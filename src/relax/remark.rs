@@ -354,6 +354,17 @@ remarks! {
             /// Keys of these loads.
             loads: Vec<&'static str>,
         } = "other-load-order",
+        /// Fewer small motions than were asked for.
+        #[error(
+            "of the {asked} slowest motions asked for {found} are told: more do not converge, or there are no more on the \
+             coarsest grid"
+        )]
+        FewerMotions {
+            /// As many as were asked for.
+            asked: usize,
+            /// As many as are told.
+            found: usize,
+        } = "fewer-motions",
         /// A given shape from which the leaf did not come to rest.
         #[error("from the given start the leaf does not come to rest: it was relaxed as without one")]
         RelaxedAnew = "relaxed-anew",

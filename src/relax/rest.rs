@@ -305,6 +305,14 @@ pub(super) fn equilibrium_with_stability(
     if leaf.outcome.is_at_rest() && !problem.leaf.has_potential() {
         leaf.stability.small_motions = small_motions(problem, &found);
         leaf.tell_small_motions();
+        let told = leaf.stability.small_motions.as_ref();
+        let told = told.map_or(requested, |motions| motions.growth_rates.len());
+        leaf.doubts.extend(
+            (told < requested).then_some(EquilibriumDoubt::FewerMotions {
+                asked: requested,
+                found: told,
+            }),
+        );
     }
     leaf.attempts = std::mem::take(&mut effort.attempts);
     RelaxedLeaf {

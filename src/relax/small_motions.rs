@@ -1,12 +1,14 @@
 //! Stability without a potential: the growth rates and frequencies of the linearised motion of a leaf at rest
 //! ([`crate::modes`]), on its grids and extrapolated.
 
-use crate::leaf::DiscreteLeaf;
+use crate::leaf::{DiscreteLeaf, State};
 use crate::modes::linearized::{
-    MOST_DENSE_STATES, MotionRoot, MotionRoots, Square, all_roots, lowest_roots, states_per_node,
+    MOST_DENSE_STATES, MotionRoot, MotionRoots, ROOT_ACCURACY, Square, all_roots, lowest_roots,
+    states_per_node,
 };
 use crate::modes::motion_pairs::{MotionPair, lowest_pairs, lowest_shapes};
 use crate::motion::{AssumedMotion, Physics};
+use crate::newton::FollowerForces;
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Richardson};
 use crate::relax::accuracy::transfer::GridLevel;
@@ -62,9 +64,6 @@ const SURVEY: GrowthSurvey = GrowthSurvey {
     most_roots: 60,
 };
 
-/// Growth of a damped motion, as a part of the size of its root, that is rounding.
-const GROWTH_ROUNDING: f64 = 1e-8;
-
 /// Growth rates and frequencies of the small motions about an equilibrium, in the scenario's unit of time.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmallMotions {
@@ -114,11 +113,9 @@ const LEAST_GRIDS: usize = 3;
 /// Largest error of a root, as a part of it.
 const LARGEST_ERROR: f64 = 1e-4;
 
-/// Factor on the error of a root by the extrapolation of a single number, and the accuracy to which roots are
-/// computed on a grid, as a part of them: of roots of random leaves on several grids the largest error was 10
-/// times that of the extrapolation on two grids, 2.8 times on four, and 1e-7 where two roots nearly meet.
+/// Factor on the error of a root by the extrapolation of a single number: of roots of random leaves on several grids the
+/// largest error was 10 times that of the extrapolation on two grids, and 2.8 times on four.
 const ROOT_SAFETY: f64 = 5.0;
-const ROOT_ACCURACY: f64 = 2e-7;
 
 /// The bound on the error of a root that is told.
 fn told_error(it: &ExtrapolatedRoot) -> Option<f64> {
@@ -257,6 +254,7 @@ pub fn small_motions(
         _ => LEAST_ROOTS,
     };
     let found_all = Cell::new(true);
+    let limit = &problem.options.limit;
     let asked = match problem.options.mode_shapes {
         true => problem.options.modes,
         false => 0,
@@ -265,10 +263,7 @@ pub fn small_motions(
         if unknowns(&level.leaf) > UNKNOWNS.without_shapes {
             return None;
         }
-        let forces = WithoutPotential::in_motion(&level.leaf, &physics);
-        let limit = &problem.options.limit;
-        let lowest =
-            |count| lowest_roots(&level.leaf, &physics, &level.state, &forces, count, limit);
+        let lowest = |count| lowest_on_grid(lowest_roots, level, &physics, count, limit);
         let mut count = wanted;
         loop {
             match lowest(count) {
@@ -342,11 +337,8 @@ pub fn small_motions(
         .collect();
     let shapes = || {
         let level = finest_of_series.as_deref()?;
-        let forces = WithoutPotential::in_motion(&level.leaf, &physics);
-        let limit = &problem.options.limit;
-        let lowest =
-            |count| lowest_shapes(&level.leaf, &physics, &level.state, &forces, count, limit);
-        let motions = lowest(series.shapes_to_compute())?;
+        let count = series.shapes_to_compute();
+        let motions = lowest_on_grid(lowest_shapes, level, &physics, count, limit)?;
         let on_finest: Vec<MotionRoot> = listed.iter().map(|it| it.on_finest).collect();
         let curves = &found.levels.last()?.leaf;
         shapes_of_roots(&on_finest, &motions, &level.leaf, curves)
@@ -390,10 +382,24 @@ pub fn small_motions(
 /// So many small motions of a leaf at rest on a grid next to zero, which can be differentiated; `None` if they are
 /// not found.
 pub(crate) fn small_motion_pairs(level: &GridLevel, count: usize) -> Option<Vec<MotionPair>> {
-    let GridLevel { leaf, state } = level;
-    let (physics, _) = Physics::for_small_motions(&leaf.leaf);
-    let forces = WithoutPotential::in_motion(leaf, &physics);
-    lowest_pairs(leaf, &physics, state, &forces, count, &Limit::default())
+    let (physics, _) = Physics::for_small_motions(&level.leaf.leaf);
+    lowest_on_grid(lowest_pairs, level, &physics, count, &Limit::default())
+}
+
+/// Computes so many of the lowest roots of a linearised motion, or what goes with them.
+type LowestMotions<T> =
+    fn(&DiscreteLeaf, &Physics, &State, &dyn FollowerForces, usize, &Limit) -> Option<T>;
+
+/// What is computed of the lowest small motions of a leaf at rest on a grid, under all of its loads.
+fn lowest_on_grid<T>(
+    lowest: LowestMotions<T>,
+    GridLevel { leaf, state }: &GridLevel,
+    physics: &Physics,
+    count: usize,
+    limit: &Limit,
+) -> Option<T> {
+    let forces = WithoutPotential::in_motion(leaf, physics);
+    lowest(leaf, physics, state, &forces, count, limit)
 }
 
 /// How many of the roots nearest to zero have one that grows among them.
@@ -517,7 +523,7 @@ fn extrapolate_damped(grids: &[(usize, Vec<MotionRoot>)]) -> Option<Vec<Extrapol
             ExtrapolatedNumber::new(values)
         };
         let (growth, frequency) = (part(|it| it.growth)?, part(|it| it.frequency)?);
-        let rounding = growth.value.abs() <= GROWTH_ROUNDING * own.size();
+        let rounding = growth.value.abs() <= ROOT_ACCURACY * own.size();
         Some(ExtrapolatedRoot {
             root: MotionRoot {
                 growth: growth.value,

@@ -1,6 +1,6 @@
 //! Shapes of small motions without a potential, beside those of the beam's equation and of undamped modes.
 
-use leafdyn::relax::{MotionShape, SmallMotions};
+use leafdyn::relax::{EquilibriumDoubt, MotionShape, SmallMotions};
 use leafdyn_testing::*;
 use nalgebra::Complex;
 
@@ -260,4 +260,17 @@ fn drag_puts_nodes_out_of_phase() {
     let later: Vec<f64> = later.collect();
     assert!(later.iter().all(|it| *it > 1e-6), "{later:?}");
     assert!(later.iter().any(|it| *it > 1e-4), "{later:?}");
+}
+
+/// Where not as many motions are found as were asked for, that is said.
+#[test]
+fn fewer_motions_than_asked_for_are_told_as_such() {
+    let column = column(5.0, ", external_damping = 0.5, internal_damping = 0.01");
+    for (asked, enough) in [(3, true), (100, false)] {
+        let leaf = relaxed(&column, &with_modes(asked, Options::default()));
+        let found = motions_of(&leaf).growth_rates.len();
+        assert_eq!(found == asked, enough, "{found}");
+        let said = EquilibriumDoubt::FewerMotions { asked, found };
+        assert_eq!(leaf.doubts.contains(&said), !enough);
+    }
 }

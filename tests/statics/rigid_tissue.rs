@@ -283,3 +283,45 @@ fn a_trace_to_tips_that_growth_keeps_apart_is_refused() {
         assert!(says.iter().all(|it| refused.contains(it)), "{refused}");
     }
 }
+
+/// Veins that neither stretch sideways nor shear between tissue that is rigid along and normal to them bear forces against
+/// each other that converge slowly: the leaf is at rest all the same, as accurately as is asked.
+#[test]
+fn forces_between_rigid_parts_converge() {
+    let scenario = Scenario::from_toml(
+        r#"
+        name = "foundation"
+        [leaf]
+        rods = 3
+        length = [1.1, 1.0, 1.05]
+        fan = [-0.18, 0.0, 0.12]
+        joined = false
+        base = [-0.4, 0.2, -0.1]
+        [stiffness]
+        torsion = 1.8
+        bending_2 = [1.4, 1.3, 2.8]
+        bending_3 = 1.7
+        axial = [230.0, 100.0, 60.0]
+        shear_2 = inf
+        shear_3 = inf
+        [rest]
+        bend_3 = -0.64
+        [tissue]
+        along = inf
+        across = 2.5
+        normal = inf
+        fold = 0.08
+        [load]
+        couple = [0.17, 0.12, 0.2]
+        couple_follows = true
+        [foundation]
+        stiffness = [4.9, 0.3, 2.1]
+        "#,
+    )
+    .unwrap();
+    let [coarse, fine] = [1e-5, 1e-7].map(|tolerance| settle(&scenario, tolerance));
+    for (a, b) in coarse.tips.iter().zip(&fine.tips) {
+        let bar = coarse.accuracy.error_estimate.unwrap() + fine.accuracy.error_estimate.unwrap();
+        assert!(a.distance(*b) <= bar, "{a} {b} {bar:e}");
+    }
+}

@@ -6,6 +6,7 @@ use crate::relax::small_motions::LEAST_ROOTS;
 use crate::relax::solve_on_grid::follower_loads::WithoutPotential;
 use crate::relax::{MotionInstability, Options, RelaxedLeaf, relax_on_grids};
 use crate::scenario::Scenario;
+use leafdyn_testing::random::Draw;
 use nalgebra::DMatrix;
 
 /// All roots from the companion matrix of M^-1 (K - W) and M^-1 C, in which every unknown that is not held has mass: it shares
@@ -163,57 +164,40 @@ fn shapes_satisfy_the_equations() {
     }
 }
 
-/// Numbers equidistributed between 0 and 1, and no others for one seed.
-struct Numbers(u64);
-
-impl Numbers {
-    fn unit(&mut self) -> f64 {
-        // Knuth's MMIX.
-        self.0 = (self.0)
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    fn list(&mut self, count: usize, low: f64, high: f64) -> String {
-        let all: Vec<String> = (0..count)
-            .map(|_| format!("{:?}", self.between(low, high)))
-            .collect();
-        format!("[{}]", all.join(", "))
-    }
+/// A list of random numbers between two bounds, as TOML writes it.
+fn list(draw: &mut Draw, count: usize, low: f64, high: f64) -> String {
+    format!("{:?}", draw.list(count, low, high))
 }
 
 /// A leaf of two to five veins, joined or with free tips, with these loads, supports and damping.
 fn random_leaf(seed: u64, with: &[&str]) -> String {
-    let mut numbers = Numbers(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) + 1);
-    numbers.unit();
-    let rods = 2 + (4.0 * numbers.unit()) as usize;
-    let joined = numbers.unit() < 0.5;
+    let mut draw = Draw(seed);
+    let rods = 2 + (4.0 * draw.even()) as usize;
+    let joined = draw.even() < 0.5;
     let (length, fan) = match joined {
-        true => (numbers.list(rods, 0.9, 1.0), "\"symmetric\"".to_owned()),
-        false => (numbers.list(rods, 0.6, 1.0), numbers.list(rods, -0.5, 0.5)),
+        true => (list(&mut draw, rods, 0.9, 1.0), "\"symmetric\"".to_owned()),
+        false => (
+            list(&mut draw, rods, 0.6, 1.0),
+            list(&mut draw, rods, -0.5, 0.5),
+        ),
     };
     let mut text = format!(
         "name = \"leaf {seed}\"
          leaf = {{ rods = {rods}, length = {length}, fan = {fan}, joined = {joined} }}
          stiffness = {{ torsion = {}, bending_2 = {}, bending_3 = {}, axial = {}, shear_2 = {}, shear_3 = {} }}\n",
-        numbers.list(rods, 0.5, 1.5),
-        numbers.list(rods, 0.5, 1.5),
-        numbers.list(rods, 0.7, 2.0),
-        numbers.list(rods, 50.0, 90.0),
-        numbers.list(rods, 50.0, 90.0),
-        numbers.list(rods, 50.0, 90.0),
+        list(&mut draw, rods, 0.5, 1.5),
+        list(&mut draw, rods, 0.5, 1.5),
+        list(&mut draw, rods, 0.7, 2.0),
+        list(&mut draw, rods, 50.0, 90.0),
+        list(&mut draw, rods, 50.0, 90.0),
+        list(&mut draw, rods, 50.0, 90.0),
     );
     let has = |what: &str| with.contains(&what);
     let strength = if has("grows") { 12.0 } else { 1.0 };
-    let mut load = format!("[load]\ngravity = {}\n", numbers.list(3, -0.4, 0.4));
+    let mut load = format!("[load]\ngravity = {}\n", list(&mut draw, 3, -0.4, 0.4));
     if has("follower") {
         let [along, beside] = [(-1.0, 0.0), (-0.3, 0.3)].map(|(low, high)| {
-            let of = numbers.between(low, high);
+            let of = draw.uniform(low, high);
             strength * of
         });
         load += &format!("follower = [{along:?}, {beside:?}, 0.2]\n");
@@ -221,49 +205,49 @@ fn random_leaf(seed: u64, with: &[&str]) -> String {
     if has("couple") {
         load += &format!(
             "couple = {}\ncouple_follows = {}\n",
-            numbers.list(3, -0.3, 0.3),
-            numbers.unit() < 0.5
+            list(&mut draw, 3, -0.3, 0.3),
+            draw.even() < 0.5
         );
     }
     let external = if has("external") {
-        numbers.between(0.1, 1.0)
+        draw.uniform(0.1, 1.0)
     } else {
         0.0
     };
     let internal = if has("internal") {
-        numbers.between(0.002, 0.02)
+        draw.uniform(0.002, 0.02)
     } else {
         0.0
     };
     text += &format!(
         "dynamics = {{ density = {}, rotary_inertia = {}, external_damping = {external:?}, internal_damping = {internal:?} }}\n",
-        numbers.list(rods, 0.8, 1.4),
-        numbers.list(rods, 0.005, 0.02),
+        list(&mut draw, rods, 0.8, 1.4),
+        list(&mut draw, rods, 0.005, 0.02),
     );
     if has("wind") {
         text += &format!(
             "wind = {{ velocity = {}, density = 1.2, drag = 1.5, width = 0.2 }}\n",
-            numbers.list(3, -2.0, 2.0)
+            list(&mut draw, 3, -2.0, 2.0)
         );
     }
     if has("foundation") {
         text += &format!(
             "foundation = {{ stiffness = {} }}\n",
-            numbers.list(3, 0.5, 8.0)
+            list(&mut draw, 3, 0.5, 8.0)
         );
     }
     text += &load;
     if has("point") {
         text += &format!(
             "[[load.point]]\nvein = 1\nat = 1.0\nforce = {}\nmoment = {}\nfollows = true\n",
-            numbers.list(3, -strength, strength),
-            numbers.list(3, -0.5, 0.5)
+            list(&mut draw, 3, -strength, strength),
+            list(&mut draw, 3, -0.5, 0.5)
         );
     }
     if has("mass") {
         text += &format!(
             "[[load.point]]\nvein = {rods}\nat = 0.5\nmass = {:?}\n",
-            numbers.between(0.05, 0.5)
+            draw.uniform(0.05, 0.5)
         );
     }
     text
@@ -271,15 +255,14 @@ fn random_leaf(seed: u64, with: &[&str]) -> String {
 
 /// The loads, supports and damping of a random leaf: some without a potential, others with.
 fn random_traits(seed: u64) -> Vec<&'static str> {
-    let mut numbers = Numbers(seed + 77);
-    numbers.unit();
+    let mut draw = Draw(seed + 77);
     let without = ["follower", "couple", "point", "wind"];
-    let first = (4.0 * numbers.unit()) as usize;
+    let first = (4.0 * draw.even()) as usize;
     let mut with = vec![without[first]];
     let others = without
         .into_iter()
         .chain(["foundation", "mass", "external", "internal", "grows"]);
-    with.extend(others.filter(|_| numbers.unit() < 0.35));
+    with.extend(others.filter(|_| draw.even() < 0.35));
     with
 }
 

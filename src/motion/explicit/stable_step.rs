@@ -6,7 +6,11 @@
 //! coupling (T. J. R. Hughes, The Finite Element Method, 1987, section
 //! 9.2). The shares are arbitrary; here they are in proportion to the stiffness with which
 //! each segment holds the node, so that a short or stiff segment has most of a mass
-//! that it alone moves fast. With the rate of internal friction from three
+//! that it alone moves fast. The inertia of a node is a tensor along its directors, of which each segment has a part of its
+//! own about each of them: the bound holds for three different moments of inertia, too. It is that of motions that are
+//! small. As nodes turn against the segments beside them by a finite angle, the axis of a small moment of inertia meets
+//! another stiffness: a leaf of flat sections that bends or twists by more than about a radian beyond its
+//! shape at the start may be faster, whereas of a leaf of round ones the stiffness that changes is small. With the rate of internal friction from three
 //! strains ([`crate::motion::rate_weights`]) a mode with the part K of its squared frequency
 //! from strains and C from coupling satisfies
 //!
