@@ -472,7 +472,7 @@ impl StabilityCheck {
 
 /// Counts the negative eigenvalues on the finest grid. On the first, unless it is the `last`,
 /// the leaf must be clearly stable. If saddles are accepted the number must be that on the
-/// grid before, if there is one. Otherwise the leaf is pushed off a saddle, and the grids start again from the
+/// grid before. Otherwise the leaf is pushed off a saddle, and the grids start again from the
 /// equilibrium reached.
 pub fn check_stability(
     problem: &RelaxationProblem,
@@ -523,12 +523,6 @@ pub fn check_stability(
         return Ok(StabilityCheck::new(found.rejoin_finest(level), known));
     };
     if problem.keeps_unstable() {
-        let coarser = found.levels.last();
-        let before = before.or_else(|| {
-            let coarser = coarser?;
-            let mut system = System::new(&coarser.leaf);
-            count_negative(problem, coarser, &mut system, false, work).index?
-        });
         let known = before == found.index || problem.segments().is_some();
         return Ok(StabilityCheck::new(found.rejoin_finest(level), known));
     }
