@@ -40,8 +40,8 @@ struct EigenvalueAccuracy {
     /// Growth of the rounding error of an eigenvalue from grid to grid.
     rounding_growth: f64,
     /// Growth of the largest bar on an added grid that is due to rounding, where the bars before are of
-    /// `EXTRAPOLATED_GRIDS`, as fewer may agree by chance, and those of `largest_listed` or less: this grid is left out,
-    /// and no finer one added.
+    /// `compared_grids` or more, as two may agree by chance, and those of `largest_listed` or less: this grid is left
+    /// out, and no finer one added.
     noisy_bar_growth: f64,
 }
 
@@ -314,7 +314,7 @@ impl<'a> NestedEigenvalues<'a> {
         self.extend_series(&level, &pairs);
         let bars = [&before, &self.series].map(EigenvalueSeries::largest_relative_bar);
         if let [Some(before_it), Some(with_it)] = bars
-            && before.grids.len() >= EXTRAPOLATED_GRIDS
+            && before.grids.len() >= EIGENVALUES.compared_grids
             && before_it <= 2.0 * EIGENVALUES.largest_listed
             && with_it > EIGENVALUES.noisy_bar_growth * before_it
         {
