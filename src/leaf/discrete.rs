@@ -9,6 +9,7 @@
 //!
 //! which differ from those at its middle by a series in ds^2.
 
+use crate::leaf::direct::pattern::SharedPattern;
 use crate::leaf::nodal_loads::{Lever, NodalMoment, ScheduledLoads};
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
@@ -74,6 +75,8 @@ pub struct DiscreteLeaf {
     pub load_factor: f64,
     /// Loads that all rods share, before the factor.
     pub loads: Loads,
+    /// The pattern of the matrix.
+    pub(super) pattern: SharedPattern,
 }
 
 /// What a held tip exerts on its holder.
@@ -167,6 +170,7 @@ impl DiscreteLeaf {
             coupling,
             strips: Vec::new(),
             own_loads: Vec::new(),
+            pattern: SharedPattern::default(),
             levers: Vec::new(),
             point_moments: Vec::new(),
             scheduled_loads: None,

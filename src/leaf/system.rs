@@ -14,7 +14,7 @@ use crate::leaf::block_tridiagonal::{
     BlockTridiagonal, GroupIncrements, GroupMasses, RodLane, TipFactor, lane_increment, rod_lane,
     set_lane_increment,
 };
-use crate::leaf::direct::pattern::MatrixPattern;
+use crate::leaf::direct::pattern::SystemPattern;
 use crate::leaf::discrete::{DiscreteLeaf, NodeMass};
 use crate::leaf::nodal_loads::NodalMoment;
 use crate::leaf::state::{ComponentSet, Increment, NodalField, displacement_part, rotation_part};
@@ -26,7 +26,7 @@ use glam::{DMat3, DVec3};
 use pulp::{Arch, Simd};
 use rayon::prelude::*;
 use std::ops::Range;
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// Number of nodes from which on groups of rods are distributed over threads. Measured: with fewer
 /// nodes waking the threads costs more than it saves.
@@ -157,7 +157,7 @@ pub struct System {
     /// Dead moments on the nodes of a single rod, as of the last assembly.
     pub(super) moments: DeadMoments,
     /// The pattern with which the matrix was first factorized as a whole.
-    pub(super) pattern: OnceLock<Arc<MatrixPattern>>,
+    pub(super) pattern: SystemPattern,
 }
 
 /// The memory of Newton's equations, passed on from one solution to the next: equations of the same
@@ -262,7 +262,7 @@ impl System {
                 .collect(),
             law_forces: Vec::new(),
             moments: DeadMoments::default(),
-            pattern: OnceLock::new(),
+            pattern: SystemPattern(leaf.pattern.clone()),
         }
     }
 

@@ -77,6 +77,9 @@ struct ModeSearch {
     /// Largest number of searches in excess of one for every mode wanted: each finds only one
     /// of equal eigenvalues.
     extra_searches: usize,
+    /// Searches in a row that find none of those counted, after which the count is rounding: on the finest grids of
+    /// blades it is, and no search of 19 found another one.
+    fruitless_searches: usize,
 }
 
 const SEARCH: ModeSearch = ModeSearch {
@@ -91,6 +94,7 @@ const SEARCH: ModeSearch = ModeSearch {
     unrefined_accuracy: 1e-6,
     approximate_starts: 2,
     extra_searches: 16,
+    fruitless_searches: 4,
 };
 
 /// A mode and its eigenvalue.
@@ -313,7 +317,7 @@ impl Vibration<'_> {
         let under = |found: &[NormalizedEigenvector], limit| {
             found.iter().filter(|f| f.eigenvalue < limit).count()
         };
-        let mut part = 0;
+        let (mut part, mut fruitless) = (0, 0);
         for search in 0..SEARCH.extra_searches + count {
             if self.wanted.time.reached() {
                 return None;
@@ -322,6 +326,12 @@ impl Vibration<'_> {
             let bound = self.search(&mut matrix, sought, limit, search, &mut found);
             if limit.is_finite() && under(&found, limit) == before {
                 part = (part + 1).min(SEARCH.counting_offsets.len() - 1);
+                fruitless += 1;
+                if fruitless == SEARCH.fruitless_searches {
+                    return None;
+                }
+            } else {
+                fruitless = 0;
             }
             if found.len() < count {
                 sought = count - found.len();

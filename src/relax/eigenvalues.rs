@@ -39,6 +39,10 @@ struct EigenvalueAccuracy {
     added_grids: usize,
     /// Growth of the rounding error of an eigenvalue from grid to grid.
     rounding_growth: f64,
+    /// Growth of the largest bar on an added grid that is due to rounding, where the bars before are of
+    /// `compared_grids` or more, as two may agree by chance, and those of `largest_listed` or less: this grid is left
+    /// out, and no finer one added.
+    noisy_bar_growth: f64,
 }
 
 const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
@@ -51,6 +55,7 @@ const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
     compared_grids: 3,
     added_grids: 6,
     rounding_growth: 4.0,
+    noisy_bar_growth: 4.0,
 };
 
 /// The lowest modes of a leaf at rest.
@@ -274,12 +279,50 @@ impl<'a> NestedEigenvalues<'a> {
         let Some(pairs) = on(&level, &near) else {
             return false;
         };
-        self.series.push(&pairs);
+        self.extend_series(&level, &pairs);
+        self.replace_finest(level, pairs);
+        true
+    }
+
+    /// Adds the eigenvalues on a grid to the series, and what limits their accuracy there.
+    fn extend_series(&mut self, level: &GridLevel, pairs: &[Eigenpair]) {
+        self.series.push(pairs);
         self.segments.push(level.leaf.segments());
         self.series.rounding = modes::quotient_rounding(&level.leaf);
         self.series.imbalance = level.leaf.segments() as f64 * level.leaf.residual(&level.state);
+    }
+
+    fn replace_finest(&mut self, level: Cow<'a, GridLevel>, pairs: Vec<Eigenpair>) {
         let before = self.finest.replace(GridModes { level, pairs });
         self.coarser = before.map(|before| before.level);
+    }
+
+    /// As [`NestedEigenvalues::add`], but leaves out a grid on which rounding makes the bars larger: the softest modes
+    /// of a nearly inextensible blade change with the forces that its stiff tissue carries, of which finer grids have
+    /// fewer digits.
+    fn add_unless_noisy(
+        &mut self,
+        level: GridLevel,
+        on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
+    ) -> bool {
+        let coarser = self.finest.as_ref();
+        let near = coarser.map_or(Vec::new(), |coarser| coarser.interpolated(&level.leaf));
+        let Some(pairs) = on(&level, &near) else {
+            return false;
+        };
+        let before = self.series.clone();
+        self.extend_series(&level, &pairs);
+        let bars = [&before, &self.series].map(EigenvalueSeries::largest_relative_bar);
+        if let [Some(before_it), Some(with_it)] = bars
+            && before.grids.len() >= EIGENVALUES.compared_grids
+            && before_it <= 2.0 * EIGENVALUES.largest_listed
+            && with_it > EIGENVALUES.noisy_bar_growth * before_it
+        {
+            self.series = before;
+            self.segments.pop();
+            return false;
+        }
+        self.replace_finest(Cow::Owned(level), pairs);
         true
     }
 
@@ -330,8 +373,8 @@ fn unknowns(leaf: &DiscreteLeaf) -> usize {
     6 * leaf.rods() * leaf.segments()
 }
 
-/// Adds finer grids than those of the relaxation until the eigenvalues are accurate enough, or
-/// the limits are reached.
+/// Adds finer grids than those of the relaxation until the eigenvalues are accurate enough, rounding
+/// makes them less accurate, or the limits are reached.
 fn refine_eigenvalues(
     problem: &RelaxationProblem,
     nested: &mut NestedEigenvalues,
@@ -348,7 +391,7 @@ fn refine_eigenvalues(
             break;
         }
         let next = on_next_grid(nested.coarser.as_deref(), finest, problem.tolerance)?;
-        if !nested.add(Cow::Owned(next), &on) {
+        if !nested.add_unless_noisy(next, &on) {
             break;
         }
     }
@@ -492,6 +535,7 @@ struct ExtrapolatedEigenvalue {
 }
 
 /// Eigenvalues on nested grids, each extrapolated on its own.
+#[derive(Clone)]
 struct EigenvalueSeries {
     /// Number of the listed eigenvalues that are negative on the finest grid.
     index: usize,
@@ -588,6 +632,13 @@ impl EigenvalueSeries {
         let mut values: Vec<_> = found.iter().enumerate().map(in_units).collect();
         sort_extrapolated(&mut values);
         values
+    }
+
+    /// The largest bar of an eigenvalue, in its unit; `None` where one has none.
+    fn largest_relative_bar(&self) -> Option<f64> {
+        let relative = |it: ExtrapolatedEigenvalue| Some(it.error? / self.unit(it.number));
+        let mut values = self.values().into_iter();
+        values.try_fold(0.0, |most, it| Some(larger(most, relative(it)?)))
     }
 
     /// Whether the relative error of all frequencies is as small as wanted.

@@ -24,6 +24,10 @@ struct EquilibriaSearch {
     same_distance: f64,
     /// Energies that differ by less than this, relatively, are the same.
     same_energy: f64,
+    /// Tolerance to which a start is relaxed first. If it ends in a stable equilibrium that is known, it is not relaxed
+    /// any further: with this error and that of the known one the distance at which they are the same is still
+    /// `same_distance`.
+    rough_tolerance: f64,
 }
 
 const SEARCH: EquilibriaSearch = EquilibriaSearch {
@@ -31,6 +35,7 @@ const SEARCH: EquilibriaSearch = EquilibriaSearch {
     most_starts: 160,
     same_distance: 1e-3,
     same_energy: 1e-6,
+    rough_tolerance: 2e-4,
 };
 
 /// The search ends after so many starts in a row without a new equilibrium, or after
@@ -122,15 +127,17 @@ pub fn equilibria(
         remarks: Vec::new(),
         wall_seconds: 0.0,
     };
-    let find = |how: SemiImplicit| {
+    let wanted = tolerance.unwrap_or(scenario.tolerance);
+    let find_within = |how: SemiImplicit, tolerance: f64| {
         let options = Options {
             method: how.into(),
-            tolerance,
+            tolerance: Some(tolerance),
             limit: limit.clone(),
             ..Options::default()
         };
         relax(scenario, &options, &mut |_| {})
     };
+    let find = |how: SemiImplicit| find_within(how, wanted);
     all.add_equilibrium(find(how)?, true);
     let of_any_index = SemiImplicit {
         keep_unstable: true,
@@ -149,12 +156,31 @@ pub fn equilibria(
             .into_iter()
             .chain(disturbed)
             .collect();
-        let batch: Vec<Result<Equilibrium, RelaxError>> =
-            (starts.par_iter().map(|start| find(*start))).collect();
+        let known = &all;
+        let end = |start: &SemiImplicit| {
+            let rough = SEARCH.rough_tolerance;
+            if rough > wanted
+                && !start.keep_unstable
+                && let Ok(ended) = find_within(*start, rough)
+                && let Some(number) = known.known_stable(&ended)
+            {
+                return Ok(EndOfStart::Known(number));
+            }
+            Ok(EndOfStart::Relaxed(Box::new(find(*start)?)))
+        };
+        let batch: Vec<Result<EndOfStart, RelaxError>> = starts.par_iter().map(end).collect();
         next += SEARCH.parallel_starts;
         for (start, ended) in starts.iter().zip(batch) {
             let before = all.found.len();
-            let ended = ended?;
+            let ended = match ended? {
+                EndOfStart::Relaxed(ended) => *ended,
+                EndOfStart::Known(number) => {
+                    all.starts += 1;
+                    all.found[number].starts += 1;
+                    in_vain += 1;
+                    continue;
+                }
+            };
             if limit.reached() && !ended.outcome.is_success() {
                 // Stopped on its way, which says nothing of its start.
                 continue;
@@ -181,7 +207,25 @@ pub fn equilibria(
     Ok(all)
 }
 
+/// Where a start led.
+enum EndOfStart {
+    /// To the equilibrium with this number, which was found before.
+    Known(usize),
+    Relaxed(Box<Equilibrium>),
+}
+
 impl Equilibria {
+    /// The number of the stable equilibrium to which this one is a rough approximation.
+    fn known_stable(&self, rough: &Equilibrium) -> Option<usize> {
+        if !rough.outcome.is_success() || rough.stable() != Some(true) {
+            return None;
+        }
+        self.found.iter().position(|found| {
+            let known = &found.equilibrium;
+            known.stable() == Some(true) && is_same_equilibrium(known, rough)
+        })
+    }
+
     fn add_equilibrium(&mut self, equilibrium: Equilibrium, plain: bool) {
         self.starts += 1;
         if !equilibrium.outcome.is_success() {

@@ -29,12 +29,15 @@ fn soft_leaf_with_many() {
     assert!(all.found.is_sorted_by_key(|one| one.equilibrium.energy));
     let saddle = all.found.last().unwrap();
     assert_eq!(saddle.equilibrium.stability.negative_eigenvalues, Some(18));
+    assert_eq!((all.found.len(), all.starts), (9, 66));
     let plain = all.found.iter().filter(|one| one.plain).count();
     assert_eq!(plain, 1, "the plain start is told");
     assert!(all.found[0].plain && all.remarks.is_empty());
     for one in &all.found {
         let residual = one.equilibrium.accuracy.residual.unwrap();
         assert!(residual < 1e-7, "{residual}");
+        let bar = one.equilibrium.accuracy.error_estimate.unwrap();
+        assert!(bar <= 1e-5, "a rough one is not told: {bar}");
     }
 }
 

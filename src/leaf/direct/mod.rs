@@ -86,9 +86,14 @@ impl DirectSolver {
             nodes: n,
             joined: system.joined,
             coupled,
+            ties: [
+                system.coupled(),
+                system.has_tissue(),
+                system.cell_blocks(0, 0).is_some(),
+            ],
         };
         let new = || Arc::new(MatrixPattern::new(of, border));
-        let kept = system.pattern.get_or_init(new);
+        let kept = system.pattern.0.get_or_init(new);
         let pattern = match kept.is_of(of, border) {
             true => Arc::clone(kept),
             false => new(),

@@ -10,7 +10,7 @@ use faer::sparse::linalg::cholesky::{
     CholeskySymbolicParams, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
     factorize_symbolic_cholesky, supernodal,
 };
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Why a matrix could not be factorized.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +64,31 @@ impl MatrixPattern {
     }
 }
 
+/// The pattern with which the matrix of a leaf on a grid was first factorized as a whole: it is that of all systems of
+/// equations of this leaf.
+#[derive(Clone, Debug, Default)]
+pub struct SharedPattern(Arc<OnceLock<Arc<MatrixPattern>>>);
+
+impl SharedPattern {
+    /// The pattern, which `new` makes if there is none.
+    pub fn get_or_init(&self, new: impl FnOnce() -> Arc<MatrixPattern>) -> &Arc<MatrixPattern> {
+        self.0.get_or_init(new)
+    }
+}
+
+/// Pattern of a system of equations, with which the spare memory of its factors is freed.
+#[derive(Clone, Debug)]
+pub struct SystemPattern(pub SharedPattern);
+
+impl Drop for SystemPattern {
+    fn drop(&mut self) {
+        let symbolic = self.0.0.get().and_then(|kept| kept.symbolic.get());
+        if let Some(Ok(symbolic)) = symbolic {
+            symbolic.spare.clear();
+        }
+    }
+}
+
 /// The symbolic factorization of a leaf's matrix, bordered or not.
 #[derive(Debug)]
 pub struct SymbolicFactorization {
@@ -72,6 +97,39 @@ pub struct SymbolicFactorization {
     pub lower: TrianglePattern,
     /// Number of unknowns, with those of the border.
     pub size: usize,
+    /// Memory of factors that are needed no more.
+    pub spare: SpareMemory,
+}
+
+/// Memory of factors and matrices that are needed no more, for the next ones of the same pattern: the system hands out new
+/// pages cleared and one by one, which for fine grids takes a fifth of the time of a factorization.
+#[derive(Debug, Default)]
+pub struct SpareMemory(Mutex<Vec<Vec<f64>>>);
+
+impl SpareMemory {
+    /// So many numbers, of any value.
+    pub fn take(&self, count: usize) -> Vec<f64> {
+        let spare = self.0.lock().ok().and_then(|mut all| {
+            let place = all.iter().position(|spare| spare.len() == count)?;
+            Some(all.swap_remove(place))
+        });
+        spare.unwrap_or_else(|| vec![0.0; count])
+    }
+
+    fn clear(&self) {
+        if let Ok(mut all) = self.0.lock() {
+            all.clear();
+        }
+    }
+
+    /// Keeps these numbers for the next that takes as many, unless some are kept already.
+    pub fn keep(&self, numbers: Vec<f64>) {
+        if let Ok(mut all) = self.0.lock()
+            && all.iter().all(|spare| spare.len() != numbers.len())
+        {
+            all.push(numbers);
+        }
+    }
 }
 
 impl SymbolicFactorization {
@@ -96,6 +154,7 @@ impl SymbolicFactorization {
             factors,
             lower,
             size,
+            spare: SpareMemory::default(),
         };
         memory::check_factor_memory(symbolic.factor_entry_count())
             .map_err(|_| DirectError::Memory)?;

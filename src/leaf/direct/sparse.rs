@@ -30,6 +30,18 @@ pub struct CholeskyFactors {
     memory: MemBuffer,
 }
 
+impl Drop for BunchKaufmanFactors {
+    fn drop(&mut self) {
+        self.symbolic.spare.keep(std::mem::take(&mut self.values));
+    }
+}
+
+impl Drop for CholeskyFactors {
+    fn drop(&mut self) {
+        self.symbolic.spare.keep(std::mem::take(&mut self.values));
+    }
+}
+
 impl CholeskyFactors {
     /// Solves in place.
     pub fn solve(&mut self, b: &mut [f64]) {
@@ -54,7 +66,8 @@ impl SymbolicFactorization {
         shift: f64,
         border: &[NodalField],
     ) -> Vec<f64> {
-        let mut values = vec![0.0; self.lower.pattern.compute_nnz()];
+        let mut values = self.spare.take(self.lower.pattern.compute_nnz());
+        values.fill(0.0);
         let mut places = self.lower.places.iter();
         let first_border = unknowns.count;
         for_each_matrix_entry(
@@ -90,7 +103,7 @@ impl SymbolicFactorization {
         .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         let mut factor = CholeskyFactors {
             symbolic: self.clone(),
-            values: vec![0.0; symbolic.len_val()],
+            values: self.spare.take(symbolic.len_val()),
             memory: MemBuffer::try_new(scratch).map_err(|_| DirectError::Memory)?,
         };
         let done = supernodal::factorize_supernodal_numeric_llt(
@@ -102,6 +115,7 @@ impl SymbolicFactorization {
             MemStack::new(&mut factor.memory),
             Default::default(),
         );
+        self.spare.keep(entries);
         Ok(done.is_ok().then_some(factor))
     }
 
@@ -125,7 +139,7 @@ impl SymbolicFactorization {
             .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         let mut factor = BunchKaufmanFactors {
             symbolic: self.clone(),
-            values: vec![0.0; symbolic.len_val()],
+            values: self.spare.take(symbolic.len_val()),
             subdiagonal: vec![0.0; self.size],
             forward: vec![0; self.size],
             inverse: vec![0; self.size],
@@ -142,6 +156,7 @@ impl SymbolicFactorization {
             MemStack::new(&mut factor.memory),
             Default::default(),
         );
+        self.spare.keep(values);
         let finite = factor.has_finite_pivots();
         finite.then_some(factor).ok_or(DirectError::NotFinite)
     }

@@ -197,3 +197,30 @@ fn counts_change_at_the_eigenvalues() {
         }
     }
 }
+
+/// Factors in memory that others left behind are those in new memory, and all equations of a leaf have one pattern.
+#[test]
+fn memory_of_factors_is_taken_by_the_next_and_patterns_are_shared() {
+    let system = assembled_system(MAX_CONDENSED_SEGMENTS + 8, &[]);
+    let solver = DirectSolver::new(&system).unwrap();
+    let solve = || {
+        let mut factors = solver.factorize(&system, 0.0).unwrap();
+        let mut b = load(solver.size());
+        factors.solve_vector(&mut b);
+        b
+    };
+    let spare = &solver.symbolic(&system).unwrap().spare;
+    let count = solver.symbolic(&system).unwrap().factor_entry_count();
+    let first = solve();
+    let kept = spare.take(count);
+    assert!(
+        kept.iter().any(|value| value.abs() > 0.0),
+        "that of the first factors"
+    );
+    spare.keep(vec![f64::NAN; count]);
+    assert_eq!(first, solve(), "what was left behind does not count");
+    let other = DirectSolver::new(&system.clone()).unwrap();
+    assert!(Arc::ptr_eq(&solver.pattern, &other.pattern));
+    let bordered = DirectSolver::with_border(&system, 1).unwrap();
+    assert!(!Arc::ptr_eq(&solver.pattern, &bordered.pattern));
+}

@@ -27,6 +27,8 @@ pub struct NumberedNodes {
     pub joined: bool,
     /// Unknowns of a node that are coupled with those of the next rod.
     pub coupled: [bool; 6],
+    /// What ties neighbours, each with entries of its own: springs, tissue at nodes, cells of it.
+    pub ties: [bool; 3],
 }
 
 /// The numbering of the unknowns of the nodes.
@@ -52,6 +54,7 @@ impl UnknownNumbering {
             nodes: n,
             joined,
             coupled,
+            ..
         } = of;
         let mut order = DissectionOrder {
             numbers: vec![[0; 6]; rods * n],
