@@ -524,6 +524,10 @@ impl MassMatrix {
             let tensor = inertia.tensor(state.q[state.base(j) + i]);
             // Fixed components have no mass.
             let free = leaf.node_freedom(j, i);
+            let tensor = match i {
+                0 => leaf.tensor_across_joint(state, j, tensor),
+                _ => tensor,
+            };
             NodeMassBlock {
                 rod: j,
                 node: i,

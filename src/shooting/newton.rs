@@ -339,6 +339,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         self.condensed = CondensedEquations::new(
             self.equations,
             &self.units,
+            &base,
             maps,
             &self.zero_energy_changes(),
             self.equations.tip_jump_derivatives(&last.end_state),
@@ -360,7 +361,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                 let rod = RodState::from_flat_state(base, j);
                 let unit = |k: usize| self.units.component_unit(PERTURBATION_SIZE * j + k);
                 let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
-                let [spin, _] = turning.node_velocity(rod.r, rod.q, self.equations.length_unit);
+                let [spin, _] =
+                    turning.node_velocity(rod.r, rod.q, rod.q, self.equations.length_unit);
                 let own = &mut turn[PERTURBATION_SIZE * j..PERTURBATION_SIZE * (j + 1)];
                 // A clamp does not turn.
                 if self.equations.base_turns(j) {
@@ -398,7 +400,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             let directed = (rods.clone()).filter(|j| !self.equations.base_turns_freely(*j));
             let moments = directed.map(|j| bases(j).m).reduce(|sum, own| sum + own);
             let angle = turning.angle_to_representative(&begins, moments);
-            let [turn, back] = turning.rotations(angle);
+            let [turn, back] = turning.rotations(angle, bases(rods.start).q);
             let point = turning.point / self.equations.length_unit;
             for (k, state) in self.nodes.states.iter_mut().enumerate() {
                 for j in rods.clone() {

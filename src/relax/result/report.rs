@@ -449,7 +449,8 @@ fn obstacle_to_rest(
     }
     if let Some(part) = reached.borne_part {
         let loads = problem.leaf.keys_without_potential();
-        return Some(RestObstacle::EndOfGrowth { part, loads });
+        let spins = problem.leaf.scenario().vein_driven_to_spin();
+        return Some(RestObstacle::EndOfGrowth { part, loads, spins });
     }
     let bends = |j: usize| {
         let base = level.state.base(j);
