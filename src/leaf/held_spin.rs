@@ -122,8 +122,7 @@ impl DiscreteLeaf {
             return tensor.inverse() * moment;
         };
         // Across the axis the restricted tensor is regular, and along it this one is.
-        let restricted =
-            self.tensor_across_joint(state, j, tensor) + outer(held.axis, held.axis);
+        let restricted = self.tensor_across_joint(state, j, tensor) + outer(held.axis, held.axis);
         restricted.inverse() * held.across(moment)
     }
 
@@ -256,7 +255,8 @@ mod tests {
     fn increments(leaf: &DiscreteLeaf, state: &State, seed: usize) -> NodalField {
         let golden = |k: usize| ((k + seed) as f64 * 0.618_033_988_749_895).fract() - 0.5;
         let count = leaf.moving_nodes().len();
-        let node = |j: usize, i: usize| std::array::from_fn(|c| golden(1 + c + 6 * (i + count * j)));
+        let node =
+            |j: usize, i: usize| std::array::from_fn(|c| golden(1 + c + 6 * (i + count * j)));
         let rod = |j: usize| (0..count).map(|i| node(j, i)).collect();
         let mut field: NodalField = (0..leaf.rods()).map(rod).collect();
         leaf.zero_held_components(&leaf.spin_axes(state), &mut field);
@@ -275,7 +275,10 @@ mod tests {
     fn forces_and_matrix_are_derivatives_of_the_energy() {
         let tissue = "tissue = { along = 20.0, across = 10.0, normal = 15.0, fold = 0.4 }";
         let cells = "tissue = { along = 20.0, across = 10.0, normal = 15.0, fold = 0.4, contraction = 0.3 }";
-        for (held, joined) in [(r#""pinned""#, true), (r#"["pinned", "clamped", "pinned"]"#, false)] {
+        for (held, joined) in [
+            (r#""pinned""#, true),
+            (r#"["pinned", "clamped", "pinned"]"#, false),
+        ] {
             for tissue in ["", tissue, cells] {
                 let text = LEAF.replace("HELD", held).replace("TISSUE", tissue);
                 let text = text.replace("JOINED", if joined { "true" } else { "false" });
@@ -318,8 +321,14 @@ mod tests {
                     let energy = slope(after.0 - before.0, far_after.0 - far_before.0);
                     let forces = slope(after.1 - before.1, far_after.1 - far_before.1);
                     let what = format!("{held} {tissue} {seed}");
-                    assert!((energy + power).abs() < 1e-7 * (1.0 + power.abs()), "{what}: {energy} {power}");
-                    assert!((forces + matrix).abs() < 1e-7 * matrix.abs(), "{what}: {forces} {matrix}");
+                    assert!(
+                        (energy + power).abs() < 1e-7 * (1.0 + power.abs()),
+                        "{what}: {energy} {power}"
+                    );
+                    assert!(
+                        (forces + matrix).abs() < 1e-7 * matrix.abs(),
+                        "{what}: {forces} {matrix}"
+                    );
                 }
             }
         }

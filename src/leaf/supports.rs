@@ -15,7 +15,7 @@ use crate::leaf::state::{ComponentSet, NodalField, NodeIncrement, SpinAxes, Stat
 use crate::leaf::system::{HeldComponents, System};
 use crate::leaf::{GrippedNode, Leaf};
 use crate::rod::{UNKNOWNS, Wrench};
-use crate::rotation::outer;
+use crate::rotation::{Pose, outer};
 use crate::scenario::{BaseRotations, SupportKind, ZeroEnergyRotation};
 use crate::simd::NumberGroup;
 use glam::{BVec3, DVec3};
@@ -504,8 +504,13 @@ impl DiscreteLeaf {
         k: usize,
     ) -> NodeIncrement {
         let length = self.leaf.scale.length;
-        let base = state.q[state.base(turning.rods.start)];
-        let [rotation, displacement] = turning.node_velocity(state.x[k], state.q[k], base, length);
+        let rod = k / (state.segments() + 1);
+        let node = Pose {
+            position: state.x[k],
+            rotation: state.q[k],
+        };
+        let base = state.q[state.base(rod)];
+        let [rotation, displacement] = turning.node_velocity(node, rod, base, length);
         NodeIncrement {
             rotation,
             displacement,
@@ -593,10 +598,10 @@ impl DiscreteLeaf {
             let directed = (rods.clone()).filter(|j| !self.leaf.base_turns_freely(*j));
             let moments = directed.map(moment).reduce(|sum, own| sum + own);
             let angle = turning.angle_to_representative(&begins, moments);
-            let [turn, back] = turning.rotations(angle, state.q[state.base(rods.start)]);
             let point = turning.point / self.leaf.scale.length;
             let n = self.segments();
             for j in rods.clone() {
+                let [turn, back] = turning.rotations(angle, j, state.q[state.base(j)]);
                 for node in self.moving_nodes() {
                     let k = state.base(j) + node;
                     let freedom = self.node_freedom(j, node);

@@ -225,9 +225,8 @@ fn shoot(
     let on_bases = errors.map(|errors| {
         let bases = || rods.iter().map(|rod| &rod.nodes[0]);
         let places: Vec<DVec3> = bases().map(|base| base.position).collect();
-        let carries_moment = |j: usize| {
-            scenario.base_held[j] != BaseSupport::Pinned || scenario.holds_base_spin(j)
-        };
+        let carries_moment =
+            |j: usize| scenario.base_held[j] != BaseSupport::Pinned || scenario.holds_base_spin(j);
         let held: Vec<bool> = (0..scenario.rods.len()).map(carries_moment).collect();
         let wrench = |(base, held): (&NodeState, &bool)| Wrench {
             force: base.rotation * base.n,

@@ -10,14 +10,14 @@
 //! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins
 //! turns as a rigid body about the line through all points where it is held, if it is loaded along
 //! this line, whatever its sections. Hinges that hold the spin (`leaf.base_spin`) allow what clamps do: the turn about
-//! their natural direction with the sections back about their own tangents; and a round vein alone turns on one about any
-//! axis about which it would turn as a rigid body, with a spin that depends on its shape. Rollers and foundations that hold along one axis alone let veins turn
+//! their natural direction with the sections back about their own tangents; and round veins that no tissue ties turn on
+//! them about any axis about which they would turn as a rigid body, each with a spin that depends on its shape. Rollers and foundations that hold along one axis alone let veins turn
 //! about this axis.
 
 #[cfg(test)]
 mod tests;
 
-use crate::rotation::{HeldSpin, angle_about};
+use crate::rotation::{HeldSpin, Pose, angle_about};
 use crate::scenario::checked::Scenario;
 use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::supports::{BaseSupport, Grip, SupportKind};
@@ -63,9 +63,9 @@ pub struct ZeroEnergyRotation {
     pub section_rate: f64,
     /// Whether the veins turn so also where they are bent.
     pub includes_bent_veins: bool,
-    /// Of a single vein whose base is on a hinge that holds its spin: the hinge, by which the rate of its sections depends
-    /// on its shape.
-    pub joint: Option<HeldSpin>,
+    /// Of veins whose bases are on hinges that hold their spin: the hinges, by which the rate of the sections of each vein
+    /// depends on its shape; empty of others.
+    pub joints: Vec<HeldSpin>,
 }
 
 /// Moments about a line about which nothing holds a group of veins.
@@ -150,32 +150,38 @@ impl ZeroEnergyRotation {
     }
 
     /// The rotations by this angle about the axis and, from the right, of sections about their own
-    /// tangents, of veins that begin with the rotation `base`.
-    pub fn rotations(&self, angle: f64, base: DQuat) -> [DQuat; 2] {
+    /// tangents, of vein `rod` of the leaf that begins with the rotation `base`.
+    pub fn rotations(&self, angle: f64, rod: usize, base: DQuat) -> [DQuat; 2] {
         let turn = match self.axis == DVec3::ZERO {
             true => DQuat::IDENTITY,
             false => DQuat::from_axis_angle(self.axis, angle),
         };
-        let back = match self.joint {
+        let back = match self.joint_of(rod) {
             None => DQuat::from_rotation_x(self.section_rate * angle),
             Some(joint) => (turn * base).conjugate() * joint.settled(turn * base),
         };
         [turn, back]
     }
 
-    /// At unit rate about the axis, the rate of the sections of veins that begin with the rotation `base`: with that of a
-    /// hinge that holds the spin, its base does not turn about the axis of the hinge.
-    fn section_rate_of(&self, base: DQuat) -> f64 {
-        self.joint.map_or(self.section_rate, |joint| {
+    /// The hinge of a vein, if it holds the spin.
+    fn joint_of(&self, rod: usize) -> Option<HeldSpin> {
+        self.joints.get(rod - self.rods.start).copied()
+    }
+
+    /// At unit rate about the axis, the rate of the sections of a vein that begins with the rotation `base`: where a hinge
+    /// holds the spin, the base then does not turn about the axis of the hinge.
+    fn section_rate_of(&self, rod: usize, base: DQuat) -> f64 {
+        self.joint_of(rod).map_or(self.section_rate, |joint| {
             let held = joint.axis(base);
             -self.axis.dot(held) / (base * DVec3::X).dot(held)
         })
     }
 
-    /// The angular velocity and the velocity, at unit rate, of a node in the position `x`, whose unit of
-    /// length is `length`, with the rotation `q`, of a vein that begins with the rotation `base`.
-    pub fn node_velocity(&self, x: DVec3, q: DQuat, base: DQuat, length: f64) -> [DVec3; 2] {
-        let spin = self.axis + self.section_rate_of(base) * (q * DVec3::X);
+    /// The angular velocity and the velocity, at unit rate, of a node of vein `rod`, which begins with the rotation `base`,
+    /// at this pose, whose unit of length is `length`.
+    pub fn node_velocity(&self, node: Pose, rod: usize, base: DQuat, length: f64) -> [DVec3; 2] {
+        let (x, d1) = (node.position, node.rotation * DVec3::X);
+        let spin = self.axis + self.section_rate_of(rod, base) * d1;
         [spin, self.axis.cross(x - self.point / length)]
     }
 }
@@ -198,11 +204,11 @@ impl Scenario {
                 axis,
                 section_rate: -1.0,
                 includes_bent_veins: true,
-                joint: None,
+                joints: Vec::new(),
             }));
             // Rigid turns before spins: to lean, a vein spins back from where it has turned to as a whole.
             let rigid = self.rigid_rotation(&rods).filter(|_| !windy);
-            let rigid = rigid.filter(|it| it.joint.is_none() || !as_on_clamps);
+            let rigid = rigid.filter(|it| it.joints.is_empty() || !as_on_clamps);
             rotations.extend(rigid);
             rotations.extend(
                 rods.filter(|j| self.spins(*j))
@@ -255,7 +261,7 @@ impl Scenario {
             axis: DVec3::ZERO,
             section_rate: 1.0,
             includes_bent_veins: is_round(&self.rods[vein]),
-            joint: None,
+            joints: Vec::new(),
         }
     }
 
@@ -265,20 +271,25 @@ impl Scenario {
         let apart = self.support_offsets(group)?;
         let axis = self.axis_between_hinges(group, &apart)?;
         let spins = group.clone().all(|vein| self.base_spins(vein));
-        // Where the spin of the base is held, a vein spins as it turns, which only a round one does.
-        let vein = group.start;
-        let turns_on_joint =
-            || group.len() == 1 && is_round(&self.rods[vein]) && !self.has_levers_on(group);
-        let turns = !self.has_moments_on(group) && (spins || turns_on_joint());
+        // Where the spin of bases is held, veins spin as they turn, which only round ones do that no tissue ties.
+        let bases = &self.rods[group.clone()];
+        let turns_on_joints = || {
+            bases.iter().all(is_round) && !self.has_levers_on(group) && !self.has_tissue_in(group)
+        };
+        let joint = |rod: &Rod| HeldSpin {
+            natural: rod.base_rotation(),
+        };
+        let turns = !self.has_moments_on(group) && (spins || turns_on_joints());
         turns.then(|| ZeroEnergyRotation {
             rods: group.clone(),
             point: self.rods[group.start].base_position(),
             axis,
             section_rate: 0.0,
             includes_bent_veins: true,
-            joint: (!spins).then(|| HeldSpin {
-                natural: self.rods[vein].base_rotation(),
-            }),
+            joints: match spins {
+                true => Vec::new(),
+                false => bases.iter().map(joint).collect(),
+            },
         })
     }
 
@@ -444,6 +455,12 @@ impl Scenario {
         points.any(|point| point.is_off_axis() && self.force_on(point) != [0.0; 3])
     }
 
+    /// Whether tissue ties veins of a group.
+    fn has_tissue_in(&self, group: &Range<usize>) -> bool {
+        let mut tissue = self.tissue.iter();
+        tissue.any(|all| all[group.start..group.end - 1].iter().any(has_some))
+    }
+
     /// The dead moments on a group of veins.
     fn group_moments(&self, group: &Range<usize>) -> Vec<DVec3> {
         let points = self.points.iter().filter(|it| group.contains(&it.vein));
@@ -505,17 +522,12 @@ impl Scenario {
             let mut clamps = clamps.into_iter().flatten();
             along(held.position) && clamps.all(|clamp| in_line(clamp.rotation() * DVec3::X))
         });
-        let gaps = group.start..group.end - 1;
-        let tissue = self
-            .tissue
-            .iter()
-            .any(|all| all[gaps.clone()].iter().any(has_some));
         let begins = |vein: usize| {
             let rod = &self.rods[vein];
             (free(vein) || in_line(tangent(rod))) && is_along(rod.base_position(), axis)
         };
         let turns = group.clone().all(begins)
-            && !tissue
+            && !self.has_tissue_in(&group)
             && self.group_loads(&group).iter().all(|load| is_along(*load, axis))
             && grips.all(|grip| along(grip.displacement))
             && self.supports_are_isotropic(&group, axis)

@@ -30,7 +30,8 @@ use crate::scenario::{
 use crate::shape::NodeState;
 use crate::shooting::follower_loads::FollowerLoads;
 use crate::shooting::rod_state::{
-    JumpDerivatives, RodState, STATE_SIZE, SlopeDerivatives, cross_matrix, rotation_difference,
+    FreeBaseChanges, JumpDerivatives, RodState, STATE_SIZE, SlopeDerivatives, cross_matrix,
+    rotation_difference,
 };
 use crate::shooting::tissue::{FrameRates, TissueEnergy};
 use crate::shooting::tissue_stresses::{RodSection, TissueState};
@@ -97,13 +98,6 @@ pub enum TipConstraint {
     Pinned,
     /// A given position and given directors.
     Clamped,
-}
-
-/// The changes of rotation and moment at a base that turns with three numbers that are free there.
-#[derive(Clone, Copy, Debug)]
-pub struct FreeBaseChanges {
-    pub rotation: DMat3,
-    pub moment: DMat3,
 }
 
 /// Material of a rod at one sigma.

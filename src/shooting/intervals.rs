@@ -11,12 +11,12 @@
 mod tests;
 
 use crate::numbers::{larger, largest};
-use crate::shooting::equations::{BoundaryValueProblem, FreeBaseChanges, TipConstraint};
+use crate::shooting::equations::{BoundaryValueProblem, TipConstraint};
 use crate::shooting::integrate::{
     InitialValueIntegrator, LeafTrajectory, ResultantSizes, ShootingNodes, UnboundedSolution,
 };
 use crate::shooting::rod_state::{
-    JumpDerivatives, PERTURBATION_SIZE, RodState, rotation_difference,
+    FreeBaseChanges, JumpDerivatives, PERTURBATION_SIZE, RodState, rotation_difference,
 };
 use crate::shooting::sensitivities::{LinearStep, Perturbations, coupled_rods};
 use faer::{Col, ColRef, Mat};
@@ -451,8 +451,7 @@ impl CondensedEquations {
         let of_base = |j: usize| FreeAtBase {
             first: equations.first_free_component(j),
             changes: equations.holds_base_spin(j).then(|| {
-                let changes =
-                    equations.free_base_changes(j, &RodState::from_flat_state(base, j));
+                let changes = equations.free_base_changes(j, &RodState::from_flat_state(base, j));
                 let unit = units.component_unit(PERTURBATION_SIZE * j + 9);
                 FreeBaseChanges {
                     moment: changes.moment * unit.recip(),

@@ -4,9 +4,11 @@
 
 use crate::natural::{RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::scenario::RodPlace;
-use crate::shooting::equations::{BoundaryValueProblem, FreeBaseChanges};
+use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
-use crate::shooting::rod_state::{JumpDerivatives, PERTURBATION_SIZE, SlopeDerivatives};
+use crate::shooting::rod_state::{
+    FreeBaseChanges, JumpDerivatives, PERTURBATION_SIZE, SlopeDerivatives,
+};
 use crate::shooting::tissue::{GapTangent, PAIR_PERTURBATION_SIZE};
 use crate::shooting::tissue_stresses::{LinearStresses, StressChanges, TissueState};
 use glam::DMat3;

@@ -151,7 +151,9 @@ fn what_is_left_out_is_refused() {
         method: Method::Explicit { segments: Some(8) },
         ..Options::default()
     };
-    let refused = relax(&scenario, &explicit, &mut |_| {}).unwrap_err().to_string();
+    let refused = relax(&scenario, &explicit, &mut |_| {})
+        .unwrap_err()
+        .to_string();
     assert!(refused.contains("leaf.base_spin"), "{refused}");
     scenario.joined = false;
     let text = serde_json::to_string(&scenario).unwrap();

@@ -117,9 +117,8 @@ fn a_held_spin_is_none_of_the_ways_to_buckle() {
     for (other, ways) in [(1.0, 2), (1000.0, 1)] {
         for (part, index) in [(0.999, 0), (1.001, ways)] {
             let place = 1.0 - part * reissner(PI, 1e3, 400.0) / 1e3;
-            let at = format!(
-                "stiffness.bending_2={other:?}; tip.position=[{place}, 0, 0]; {HELD_SPIN}"
-            );
+            let at =
+                format!("stiffness.bending_2={other:?}; tip.position=[{place}, 0, 0]; {HELD_SPIN}");
             let leaf = settle_on(base(COLUMN, &at).scenario(), 512, true);
             assert_eq!(leaf.stability.negative_eigenvalues, Some(index), "{at}");
             assert_eq!(leaf.stability.neutral_directions, 0, "{at}");
@@ -140,9 +139,7 @@ fn a_held_spin_vibrates_as_in_a_clamp() {
         };
         let leaf = settled(base(COLUMN, &entries).scenario(), &options);
         let modes = leaf.stability.modes.unwrap();
-        let twists = |mode: &Mode| {
-            largest(mode.displacement[0].iter().map(|d| d.length())) < 1e-6
-        };
+        let twists = |mode: &Mode| largest(mode.displacement[0].iter().map(|d| d.length())) < 1e-6;
         modes
             .iter()
             .map(|mode| (mode.eigenvalue, twists(mode)))
@@ -492,6 +489,8 @@ fn counts_of_veins_held_in_several_ways_are_those_of_the_dense_matrix() {
     "#;
     let clamp = "leaf.base_held=['clamped', 'pinned']";
     let spring = "leaf.base_held=['elastic', 'pinned']; leaf.base_turn_stiffness=2.0";
+    let held = "leaf.base_held=pinned; leaf.base_spin=held";
+    let beside = "leaf.base_held=['clamped', 'pinned']; leaf.base_spin=held";
     let apart = "leaf.joined=false";
     let in_line = "leaf.fan=[0.0, 0.0]; leaf.base=[[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]; \
                    load.gravity=[0, 0, 0]; load.tip_force=[-14.0, 0.0, 0.0]";
@@ -504,6 +503,13 @@ fn counts_of_veins_held_in_several_ways_are_those_of_the_dense_matrix() {
         (clamp, apart),
         (clamp, in_line),
         (spring, in_line),
+        (held, ""),
+        (held, "coupling.x=2; coupling.y=2; coupling.z=3"),
+        (held, "stiffness.bending_3=2.0"),
+        (held, apart),
+        (beside, ""),
+        (beside, apart),
+        (beside, in_line),
     ] {
         let leaf = base(VEINS, &format!("{held}; {entries}"));
         let scenario = leaf.scenario();

@@ -21,8 +21,16 @@ fn text(held: &str) -> String {
     )
 }
 
+/// With these entries in place of others, or further tables of veins that do not meet.
 fn veins(held: &str, entries: &str) -> Scenario {
-    base(&text(held), entries).scenario().clone()
+    let base = match entries.contains("[[") {
+        true => base(
+            &(text(held) + entries),
+            "leaf.joined=false; load.g=[0.0, 0.0, -1.0]",
+        ),
+        false => base(&text(held), entries),
+    };
+    base.scenario().clone()
 }
 
 const EACH_WAY: [&str; 2] = [
@@ -32,9 +40,19 @@ const EACH_WAY: [&str; 2] = [
 const TISSUE: &str = "tissue.along=20.0; tissue.across=10.0; tissue.normal=15.0; tissue.fold=0.4";
 const COUPLING: &str = "coupling.x=2.0; coupling.y=3.0; coupling.z=4.0";
 const FOLLOWERS: &str = "load.follower=[0.2, 0.1, -0.4]; load.couple=[0.1, 0.05, 0.0]";
-const GRIPPED: &str = "leaf.joined=false; grip=[{vein=2, at=0.6, stiffness=[0.0, 5.0, inf]}]";
-const MASS: &str = "leaf.joined=false; load.g=[0.0, 0.0, -9.8]; \
-     load.point=[{vein=3, at=0.7, mass=0.05, offset=[0.02, 0.03]}, {vein=1, at=1.0, force=[0.0, 0.3, 0.2], follows=true}]";
+const FOUNDED: &str = "leaf.joined=false; foundation.stiffness=[1.0, 2.0, 3.0]";
+const MASS: &str = "
+    [[load.point]]
+    vein = 3
+    at = 0.7
+    mass = 0.05
+    offset = [0.02, 0.03]
+    [[load.point]]
+    vein = 1
+    at = 1.0
+    force = [0.0, 0.3, 0.2]
+    follows = true
+";
 
 /// The axis of a joint: half-way between the natural direction of the base and its present one.
 fn joint_axis(scenario: &Scenario, j: usize, base: DQuat) -> DVec3 {
@@ -42,17 +60,21 @@ fn joint_axis(scenario: &Scenario, j: usize, base: DQuat) -> DVec3 {
     (natural * DVec3::X + base * DVec3::X).normalize()
 }
 
-/// The frame is the natural one after the shortest turn of its tangent, and nothing but a moment along the axis of the
-/// joint is on it.
-fn is_on_joint(scenario: &Scenario, j: usize, root: &NodeState) {
+/// The frame is the natural one after the shortest turn of its tangent, but for rounding.
+fn is_turned_shortest(scenario: &Scenario, j: usize, root: &NodeState) {
     let natural = scenario.rods[j].base_rotation();
     let [from, to] = [natural, root.rotation].map(|q| q * DVec3::X);
     let wanted = DQuat::from_rotation_arc(from, to) * natural;
-    let off = root.rotation.angle_between(wanted);
-    assert!(off < 1e-7, "{j}: {off:e}");
+    let off = (root.rotation * wanted.conjugate()).xyz().length();
+    assert!(off < 1e-12, "{j}: {off:e}");
+}
+
+/// Of what was shot: nothing but a moment along the axis of the joint is on the base.
+fn is_on_joint(scenario: &Scenario, j: usize, root: &NodeState) {
+    is_turned_shortest(scenario, j, root);
     let moment = root.rotation * root.m;
     let across = moment.reject_from_normalized(joint_axis(scenario, j, root.rotation));
-    assert!(across.length() < 1e-7, "{j}: {across}");
+    assert!(across.length() < 1e-12, "{j}: {across}");
 }
 
 /// Relaxation and shooting, which share neither grids nor elements, find the same leaves and the same forces and moments
@@ -67,11 +89,12 @@ fn shooting_finds_the_same_leaves() {
             TISSUE,
             "leaf.joined=false",
             FOLLOWERS,
-            GRIPPED,
+            FOUNDED,
             MASS,
         ] {
             let scenario = veins(held, entries);
             let relaxed = settle(&scenario, 1e-10);
+            let on_grid = settled(&scenario, &iterated(1e-12, 16));
             let shot = found(&scenario, shoot_near(&scenario, &relaxed));
             let off = apart(&scenario, &relaxed.shape.rods, &shot.rods);
             assert!(off.position < 1e-8, "{held} {entries}: {:e}", off.position);
@@ -89,7 +112,7 @@ fn shooting_finds_the_same_leaves() {
                 assert!(own.distance(moment) < 1e-6, "{held} {entries}");
                 if scenario.base_held[j].word() == "pinned" {
                     is_on_joint(&scenario, j, root);
-                    is_on_joint(&scenario, j, &relaxed.shape.rods[j].nodes[0]);
+                    is_turned_shortest(&scenario, j, &on_grid.shape.rods[j].nodes[0]);
                     largest_moment = largest_moment.max(own.length());
                 }
             }
@@ -98,8 +121,8 @@ fn shooting_finds_the_same_leaves() {
     assert!(largest_moment > 0.05, "{largest_moment}");
 }
 
-/// A straight round vein whose tip a hinge holds, and a moment T about its axis twists: by T L/GJ, as on a clamp, and
-/// the joint carries T.
+/// A straight round vein whose tip a hinge holds, and a moment T about its axis at the distance s twists: by T s/GJ, as
+/// on a clamp, and the joint carries T.
 #[test]
 fn an_end_couple_twists_a_vein() {
     for held in ["clamped", "pinned"] {
@@ -110,17 +133,20 @@ fn an_end_couple_twists_a_vein() {
             leaf = {{ rods = 1, length = 1.0, fan = [0.0], base_held = "{held}", base_spin = "{spin}" }}
             stiffness = {{ torsion = 0.7, bending_2 = 1.0, bending_3 = 1.0, axial = 100.0, shear_2 = 80.0, shear_3 = 80.0 }}
             tip = {{ held = "pinned", position = [1.0, 0.0, 0.0] }}
-            load.tip_moment = [0.4, 0.0, 0.0]
+            [[load.point]]
+            vein = 1
+            at = 0.75
+            moment = [0.4, 0.0, 0.0]
             "#
         );
         let leaf = settle(&parse(&text), 1e-10);
         let rod = &leaf.shape.rods[0];
         let ends = [0, rod.nodes.len() - 1].map(|i| rod.nodes[i].rotation);
         let twist = ends[1].mul_quat(ends[0].conjugate()).to_scaled_axis();
-        assert!(twist.distance(0.4 / 0.7 * DVec3::X) < 1e-9, "{twist}");
+        let wanted = 0.75 * 0.4 / 0.7;
+        assert!(twist.distance(wanted * DVec3::X) < 1e-9, "{twist}");
         let moment = leaf.base_reactions[0].moment.unwrap();
         assert!(moment.distance(0.4 * DVec3::X) < 1e-9, "{held}: {moment}");
-        assert_eq!(leaf.stability.negative_eigenvalues, Some(0));
     }
 }
 
@@ -158,13 +184,15 @@ fn a_base_turns_far() {
         "#;
     let scenario = parse(text);
     let relaxed = settle(&scenario, 1e-10);
-    let root = &relaxed.shape.rods[0].nodes[0];
-    is_on_joint(&scenario, 0, root);
+    let on_grid = settled(&scenario, &iterated(1e-12, 16));
+    let root = &on_grid.shape.rods[0].nodes[0];
+    is_turned_shortest(&scenario, 0, root);
     let turned = root
         .rotation
         .angle_between(scenario.rods[0].base_rotation());
     assert!(turned > 0.6 * PI, "{turned}");
     let shot = found(&scenario, shoot_near(&scenario, &relaxed));
+    is_on_joint(&scenario, 0, &shot.rods[0].nodes[0]);
     let off = apart(&scenario, &relaxed.shape.rods, &shot.rods);
     assert!(off.position < 1e-8, "{:e}", off.position);
 }
@@ -223,6 +251,32 @@ fn derivatives_are_those_of_whole_relaxations() {
             }
         }
     }
+}
+
+/// A couple along a vein makes it spin on a hinge on which it may, which the remark on the missing equilibrium says; where
+/// the spin is held, the vein rests.
+#[test]
+fn what_spins_without_end_is_told() {
+    let text = |spin: &str| {
+        format!(
+            r#"
+            name = "spin"
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0], elevation = -1.0, base_held = "pinned", base_spin = "{spin}" }}
+            stiffness = {{ torsion = 0.7, bending_2 = 1.0, bending_3 = 1.5, axial = 100.0, shear_2 = 80.0, shear_3 = 80.0 }}
+            rest.bend_2 = 0.3
+            load = {{ gravity = [0.0, 0.0, -1.0], couple = [0.1, 0.0, 0.0], couple_follows = true }}
+            "#
+        )
+    };
+    let free = relaxed(&parse(&text("free")), &Options::default());
+    assert!(!free.outcome.is_success());
+    let remark = free.remark.unwrap().to_string();
+    assert!(remark.contains("leaf.base_spin = \"held\""), "{remark}");
+    let scenario = parse(&text("held"));
+    let held = settle(&scenario, 1e-9);
+    let shot = found(&scenario, shoot_near(&scenario, &held));
+    let off = apart(&scenario, &held.shape.rods, &shot.rods);
+    assert!(off.position < 1e-8, "{:e}", off.position);
 }
 
 #[test]

@@ -376,7 +376,9 @@ impl Explicit {
         self.packs.iter_mut().for_each(Pack::begin_joint_step);
         self.move_packs(&loads, self.law(rest, remember), keep, kick, drift);
         work += self.drive_supports(drift);
-        let joints: f64 = (self.packs.iter_mut()).map(|pack| pack.turn_joints(drift)).sum();
+        let joints: f64 = (self.packs.iter_mut())
+            .map(|pack| pack.turn_joints(drift))
+            .sum();
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for pack in &self.packs {
             energy += pack.totals.twice_kinetic;
