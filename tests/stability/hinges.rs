@@ -145,8 +145,7 @@ fn a_held_spin_vibrates_as_in_a_clamp() {
             .map(|mode| (mode.eigenvalue, twists(mode)))
             .collect::<Vec<_>>()
     };
-    let [free, held, clamped] =
-        ["", HELD_SPIN, "leaf.base_held=clamped"].map(|entries| squares(entries));
+    let [free, held, clamped] = ["", HELD_SPIN, "leaf.base_held=clamped"].map(squares);
     let pick = |of: &[(f64, bool)], twists: bool| -> Vec<f64> {
         let own = of.iter().filter(|it| it.1 == twists);
         own.map(|it| it.0).collect()
