@@ -16,6 +16,66 @@ pub struct Pose {
     pub rotation: DQuat,
 }
 
+/// A frame that a constant-velocity joint holds: where its first axis is turned from its natural direction n, the frame
+/// has turned from the natural one by the shortest turn that does it.
+///
+/// With the unit quaternion r = (w, v) of the turn these turns are those with n . v = 0, a great sphere of the unit
+/// quaternions, whose geodesics are its own: exp(delta) r stays on it for every increment delta across the unit vector
+///
+/// a = w n + v x n,
+///
+/// which lies half-way between n and where n has turned to. So an energy restricted to these turns has the first and
+/// second derivatives, along increments across a, that it has without the joint: no curvature of the constraint is
+/// added. The moment of the joint is along a.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeldSpin {
+    /// The rotation of the natural frame.
+    pub natural: DQuat,
+}
+
+impl HeldSpin {
+    /// The vector part v and the scalar part w of the turn from the natural frame to `q`, and n.
+    fn turn(self, q: DQuat) -> (DVec3, f64, DVec3) {
+        let turn = q * self.natural.conjugate();
+        (turn.xyz(), turn.w, self.natural * DVec3::X)
+    }
+
+    /// The unit vector a about which the joint does not let the frame `q` turn; its sign is that of the quaternion.
+    pub fn axis(self, q: DQuat) -> DVec3 {
+        let (v, w, n) = self.turn(q);
+        (w * n + v.cross(n)).normalize()
+    }
+
+    /// The derivative of a by further rotations of the frame about fixed axes.
+    pub fn axis_rate(self, q: DQuat) -> DMat3 {
+        let (v, w, n) = self.turn(q);
+        let [x, y, z] = DVec3::AXES.map(|delta| {
+            let (dw, dv) = (-0.5 * v.dot(delta), 0.5 * (w * delta + delta.cross(v)));
+            dw * n + dv.cross(n)
+        });
+        DMat3::from_cols(x, y, z)
+    }
+
+    /// The frame that the joint allows with the first axis of `q`. Unchanged where `q` is allowed but for rounding, and
+    /// where its first axis is opposite to n: every turn by half a revolution leads there.
+    pub fn settled(self, q: DQuat) -> DQuat {
+        let (v, w, n) = self.turn(q);
+        let along = v.dot(n);
+        let twist = w.hypot(along);
+        if along.abs() <= SPIN_ROUNDING || twist <= SPIN_ROUNDING {
+            return q;
+        }
+        // The turn is the shortest one after a twist about n.
+        let [x, y, z] = (n * along / twist).to_array();
+        let twist = DQuat::from_xyzw(x, y, z, w / twist);
+        let turn = q * self.natural.conjugate();
+        (turn * twist.conjugate() * self.natural).normalize()
+    }
+}
+
+/// The sine of half a spin that is rounding.
+const SPIN_ROUNDING: f64 = 4.0 * f64::EPSILON;
+
 /// The angle about a unit `axis` by which a vector turns until its part normal to the axis has the
 /// direction of `to`, which is normal to it; zero if it has no such part.
 pub fn angle_about(axis: DVec3, from: DVec3, to: DVec3) -> f64 {
@@ -409,6 +469,41 @@ mod tests {
                 let turned = |h: f64| log(exp(h * axis) * exp(theta));
                 let slope = (turned(1e-5) - turned(-1e-5)) / 2e-5;
                 assert!(slope.distance(rate * axis) < 1e-9, "{size} {axis}");
+            }
+        }
+    }
+
+    /// Increments across the axis of a joint lead along what it allows, however far; the frame there is the natural one
+    /// after the shortest turn of its first axis, whose direction mirrors n in the axis.
+    #[test]
+    fn a_held_spin_is_that_of_the_shortest_turn() {
+        let natural = exp(DVec3::new(0.3, -0.8, 0.5));
+        let joint = HeldSpin { natural };
+        let mut q = natural;
+        for step in 0..40 {
+            let axis = joint.axis(q);
+            let k = step as f64;
+            let by = DVec3::new(k.sin(), (1.7 * k).cos(), (0.3 * k).sin());
+            q = (exp(0.5 * (by - by.dot(axis) * axis)) * q).normalize();
+            let [n, d1] = [natural, q].map(|q| q * DVec3::X);
+            let shortest = DQuat::from_rotation_arc(n, d1) * natural;
+            assert!(shortest.angle_between(q) < 1e-7);
+            assert!(joint.settled(q).angle_between(q) < 1e-7);
+            let axis = joint.axis(q);
+            assert!((2.0 * n.dot(axis) * axis - n).distance(d1) < 1e-14);
+            // Spun frames come back.
+            let spun = (q * DQuat::from_rotation_x(0.9)).normalize();
+            assert!(joint.settled(spun).angle_between(q) < 1e-7);
+            let rate = joint.axis_rate(q);
+            for about in DVec3::AXES {
+                let turned = |h: f64| joint.axis(exp(h * about) * q);
+                let slope = (turned(1e-5) - turned(-1e-5)) / 2e-5;
+                let across = |v: DVec3| v - v.dot(axis) * axis;
+                assert!(across(slope).distance(across(rate * about)) < 1e-9);
+                // Along what the joint allows the axis turns with half the rate.
+                let allowed = across(about);
+                let half = 0.5 * allowed.cross(axis);
+                assert!(across(rate * allowed - half).length() < 1e-13);
             }
         }
     }

@@ -66,6 +66,7 @@ impl DiscreteLeaf {
         if MATRIX && self.has_tissue() {
             self.clear_held_gap_blocks(system);
         }
+        self.hold_spins(state, system, MATRIX);
         for group in &system.groups {
             total.energy += group.sums.energy;
             total.largest_turn = larger(total.largest_turn, group.sums.largest_turn);
@@ -89,6 +90,7 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             self.clear_held_components(j, &mut system.groups[rod_lane(j).group].rhs);
         }
+        self.hold_spins(state, system, false);
     }
 
     /// Subtracts `times` the excess stiffness of the elements against rotations of their nodes
@@ -153,6 +155,7 @@ impl DiscreteLeaf {
         for (force, more) in carried.zip(&solution.law_forces) {
             *force += step * *more;
         }
+        self.settle_spins(next);
     }
 
     /// Largest unbalanced nodal force or moment, or violation of the
@@ -174,7 +177,7 @@ impl DiscreteLeaf {
                 if i >= self.first_node() {
                     let free = self.freedom_without_tip_support(j, i);
                     let on_node = free.of_wrench(Wrench {
-                        moment: moment - gradient.a,
+                        moment: self.across_joint(state, j, i, moment - gradient.a),
                         force: force + gradient.x,
                     });
                     let unbalanced = self.unbalanced_size(j, on_node.force, on_node.moment);
@@ -603,6 +606,7 @@ impl DiscreteLeaf {
         for j in 0..self.rods() {
             self.clear_held_components(j, &mut system.groups[rod_lane(j).group].rhs);
         }
+        system.clear_held_spins();
     }
 }
 

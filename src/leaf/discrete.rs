@@ -10,6 +10,7 @@
 //! which differ from those at its middle by a series in ds^2.
 
 use crate::leaf::direct::pattern::SharedPattern;
+use crate::leaf::held_spin::BaseJoint;
 use crate::leaf::nodal_loads::{Lever, NodalMoment, ScheduledLoads};
 use crate::leaf::springs::NodeSprings;
 use crate::leaf::state::State;
@@ -71,6 +72,8 @@ pub struct DiscreteLeaf {
     pub(super) grip_of_node: Vec<Option<usize>>,
     /// Springs of supports that give.
     pub(super) springs: NodeSprings,
+    /// Bases on hinges that hold their spin.
+    pub(super) joints: Vec<BaseJoint>,
     /// Factor of all loads: one, except during continuation in the loads.
     pub load_factor: f64,
     /// Loads that all rods share, before the factor.
@@ -178,6 +181,7 @@ impl DiscreteLeaf {
             grips: Vec::new(),
             grip_of_node: Vec::new(),
             springs: NodeSprings::default(),
+            joints: leaf.base_joints(),
             load_factor: 1.0,
             loads: leaf.loads,
         };

@@ -206,9 +206,13 @@ impl DiscreteLeaf {
 }
 
 impl DiscreteLeaf {
-    /// The part of a load on node `i` of rod `j` that meets no support.
-    fn unsupported_load(&self, j: usize, i: usize, load: Wrench) -> Wrench {
-        self.node_freedom(j, i).of_wrench(load)
+    /// The part of a load on node `i` of rod `j` that meets no support in a state.
+    fn unsupported_load(&self, state: &State, j: usize, i: usize, load: Wrench) -> Wrench {
+        let free = self.node_freedom(j, i).of_wrench(load);
+        Wrench {
+            moment: self.across_joint(state, j, i, free.moment),
+            ..free
+        }
     }
 
     /// Adds the loads without a potential, but for dead moments on a single rod and wind, to the right-hand
@@ -219,7 +223,7 @@ impl DiscreteLeaf {
         }
         for (j, i) in self.rod_index_pairs(self.moving_nodes()) {
             let load = self.follower_wrench(state, j, i);
-            system.add_load(j, i, self.unsupported_load(j, i, load));
+            system.add_load(j, i, self.unsupported_load(state, j, i, load));
         }
     }
 
@@ -242,7 +246,7 @@ impl DiscreteLeaf {
             }
             let turn = rotation_part(&increments[j][i - first]);
             let change = load.derivative(state.q[state.base(j) + i], turn);
-            let change = self.unsupported_load(j, i, change);
+            let change = self.unsupported_load(state, j, i, change);
             add_to_increment(&mut forces[j][i - first], change.moment, change.force);
         }
     }

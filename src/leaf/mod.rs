@@ -15,6 +15,7 @@ mod direct;
 mod discrete;
 mod elastic_supports;
 mod followers;
+mod held_spin;
 mod law;
 mod levers;
 mod loads;
@@ -389,7 +390,7 @@ impl Leaf {
         let [own, others] = [self, other].map(Leaf::scenario);
         own.tissue == others.tissue
             && (own.tissue_grown, own.joined) == (others.tissue_grown, others.joined)
-            && own.base_held == others.base_held
+            && (&own.base_held, own.base_spin) == (&others.base_held, others.base_spin)
             && own.grips == others.grips
             && self.tip_support.is_some() == other.tip_support.is_some()
     }
@@ -517,9 +518,14 @@ impl Leaf {
         (0..self.rods()).any(|j| self.base_turns_freely(j))
     }
 
-    /// Whether the base of rod `j` turns freely on a hinge.
+    /// Whether the base of rod `j` turns freely on a hinge, which may hold its spin.
     pub fn base_turns_freely(&self, j: usize) -> bool {
         self.scenario.base_held[j] == BaseSupport::Pinned
+    }
+
+    /// Whether the support of the base of rod `j` carries moments: all but a hinge on which it may spin.
+    pub fn base_carries_moment(&self, j: usize) -> bool {
+        !self.base_turns_freely(j) || self.holds_base_spin(j)
     }
 
     /// Whether the base of rod `j` stays in its place and turns, freely or against a spring.

@@ -4,7 +4,7 @@
 //! that an iteration costs one solve with B and one product with the sparse E. [`DefiniteFactors`] is
 //! for several right-hand sides: rod by rod or, where tissue ties the rods, as a whole.
 
-use crate::leaf::block_tridiagonal::{GroupIncrements, ShiftedMasses, TipFactor};
+use crate::leaf::block_tridiagonal::{GroupIncrements, ShiftedMasses, TipFactor, rod_lane};
 use crate::leaf::direct::{DirectSolver, MatrixFactors};
 use crate::leaf::system::{
     CouplingOperator, CurvatureKernel, DirectionUpdateKernel, MassLoad, SolutionUpdateKernel,
@@ -173,6 +173,15 @@ impl System {
                 }
             }
         });
+        if inertia.is_some() {
+            // Velocities of before are across the axes of before.
+            for held in self.spin_axes.iter() {
+                let at = rod_lane(held.rod);
+                let base = &mut self.groups[at.group].residual[0];
+                let across = held.across(DVec3::from([0, 1, 2].map(|c| base[c].0[at.lane])));
+                (0..3).for_each(|c| base[c].0[at.lane] = across[c]);
+            }
+        }
         let mut tip_residual = DVec3::ZERO;
         if joined {
             for group in &mut self.groups {

@@ -196,6 +196,37 @@ impl State {
     }
 }
 
+/// The unit vector about which a hinge does not let the base of a rod turn, as it holds its spin.
+#[derive(Clone, Copy, Debug)]
+pub struct SpinAxis {
+    pub rod: usize,
+    pub axis: DVec3,
+}
+
+impl SpinAxis {
+    /// What of a vector is across the axis.
+    pub fn across(self, vector: DVec3) -> DVec3 {
+        vector - vector.dot(self.axis) * self.axis
+    }
+}
+
+/// The axes of all bases whose spin is held, in a state.
+#[derive(Clone, Debug, Default)]
+pub struct SpinAxes(pub(super) Vec<SpinAxis>);
+
+impl SpinAxes {
+    /// The axes.
+    pub fn iter(&self) -> impl Iterator<Item = SpinAxis> {
+        self.0.iter().copied()
+    }
+
+    /// What of a moment on the base of rod `j`, or of its rotation, is across its axis; all of it without one.
+    pub fn across(&self, j: usize, vector: DVec3) -> DVec3 {
+        let own = self.0.iter().find(|held| held.rod == j);
+        own.map_or(vector, |held| held.across(vector))
+    }
+}
+
 /// A set of the components of a node's increment: rotations, then displacements, along the lab axes. Bit `c`
 /// stands for component `c`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

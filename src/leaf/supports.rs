@@ -11,11 +11,11 @@
 use crate::leaf::assembly::largest_component;
 use crate::leaf::block_tridiagonal::{BlockTridiagonal, GroupIncrements, rod_lane};
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::{ComponentSet, NodalField, NodeIncrement, State};
+use crate::leaf::state::{ComponentSet, NodalField, NodeIncrement, SpinAxes, State};
 use crate::leaf::system::{HeldComponents, System};
 use crate::leaf::{GrippedNode, Leaf};
 use crate::rod::{UNKNOWNS, Wrench};
-use crate::rotation::outer;
+use crate::rotation::{Pose, outer};
 use crate::scenario::{BaseRotations, SupportKind, ZeroEnergyRotation};
 use crate::simd::NumberGroup;
 use glam::{BVec3, DVec3};
@@ -227,7 +227,7 @@ impl DiscreteLeaf {
     }
 
     /// What every rod exerts on the support of its base: the force, and the moment about the base, which
-    /// of a hinge is zero, or that of its spring.
+    /// of a hinge is zero, what is about the axis of one that holds the spin, or that of its spring.
     pub fn base_reactions(&self, state: &State) -> Vec<Wrench> {
         (0..self.rods())
             .map(|j| self.support_load(state, j, 0))
@@ -244,6 +244,10 @@ impl DiscreteLeaf {
         Wrench {
             force: own.force + tissue.force,
             moment: match self.leaf.base_turns(j) {
+                true if self.leaf.holds_base_spin(j) => {
+                    let moment = own.moment + tissue.moment;
+                    moment - self.across_joint(state, j, 0, moment)
+                }
                 true => -self.spring_load(state, j, 0).moment,
                 false => own.moment + tissue.moment + self.dead_moment_on_clamp(),
             },
@@ -341,8 +345,10 @@ impl DiscreteLeaf {
         }
     }
 
-    /// Sets the held components of increments of the nodes, or of forces on them, to zero.
-    pub fn zero_held_components(&self, field: &mut NodalField) {
+    /// Sets the held components of increments of the nodes, or of forces on them, to zero, where hinges hold the bases
+    /// about these axes.
+    pub fn zero_held_components(&self, spins: &SpinAxes, field: &mut NodalField) {
+        spins.restrict(field);
         for (j, i) in self.rod_index_pairs(self.first_held()..self.segments() + 1) {
             for c in self.held_components(j, i).iter() {
                 field[j][i - self.first_node()][c] = 0.0;
@@ -434,13 +440,17 @@ impl Leaf {
         }
     }
 
-    /// Puts the bases where they are held: clamped ones in their directions, too.
+    /// Puts the bases where they are held: clamped ones in their directions, too, those whose spin is held in the next
+    /// frame that their hinges allow.
     pub fn place_held_bases(&self, state: &mut State) {
         for j in 0..self.rods() {
             let (base, pose) = (state.base(j), self.base_pose(j));
             state.x[base] = pose.position;
             if !self.base_turns(j) {
                 state.q[base] = pose.rotation;
+            }
+            if let Some(joint) = self.base_joint(j) {
+                state.q[base] = joint.settled(state.q[base]);
             }
         }
     }
@@ -494,7 +504,13 @@ impl DiscreteLeaf {
         k: usize,
     ) -> NodeIncrement {
         let length = self.leaf.scale.length;
-        let [rotation, displacement] = turning.node_velocity(state.x[k], state.q[k], length);
+        let rod = k / (state.segments() + 1);
+        let node = Pose {
+            position: state.x[k],
+            rotation: state.q[k],
+        };
+        let base = state.q[state.base(rod)];
+        let [rotation, displacement] = turning.node_velocity(node, rod, base, length);
         NodeIncrement {
             rotation,
             displacement,
@@ -582,10 +598,10 @@ impl DiscreteLeaf {
             let directed = (rods.clone()).filter(|j| !self.leaf.base_turns_freely(*j));
             let moments = directed.map(moment).reduce(|sum, own| sum + own);
             let angle = turning.angle_to_representative(&begins, moments);
-            let [turn, back] = turning.rotations(angle);
             let point = turning.point / self.leaf.scale.length;
             let n = self.segments();
             for j in rods.clone() {
+                let [turn, back] = turning.rotations(angle, j, state.q[state.base(j)]);
                 for node in self.moving_nodes() {
                     let k = state.base(j) + node;
                     let freedom = self.node_freedom(j, node);

@@ -17,7 +17,9 @@ use crate::leaf::block_tridiagonal::{
 use crate::leaf::direct::pattern::SystemPattern;
 use crate::leaf::discrete::{DiscreteLeaf, NodeMass};
 use crate::leaf::nodal_loads::NodalMoment;
-use crate::leaf::state::{ComponentSet, Increment, NodalField, displacement_part, rotation_part};
+use crate::leaf::state::{
+    ComponentSet, Increment, NodalField, SpinAxes, displacement_part, rotation_part,
+};
 use crate::numbers::larger;
 use crate::rod::{NodeBlock, Wrench};
 use crate::scenario::Scenario;
@@ -151,6 +153,8 @@ pub struct System {
     /// What hinges and grips hold, nodes from the first with equations: these components have no
     /// momentum.
     held_components: Vec<HeldComponents>,
+    /// About which axes hinges hold bases, as of the last assembly.
+    pub(super) spin_axes: SpinAxes,
     /// Spatial forces of the segments, beside those of the solution, that complete the law of nearly
     /// rigid ones; empty without any.
     pub(super) law_forces: Vec<DVec3>,
@@ -260,6 +264,7 @@ impl System {
                     })
                 })
                 .collect(),
+            spin_axes: SpinAxes::default(),
             law_forces: Vec::new(),
             moments: DeadMoments::default(),
             pattern: SystemPattern(leaf.pattern.clone()),
@@ -456,6 +461,7 @@ impl System {
                 momentum[held.rod][held.node][c] = 0.0;
             }
         }
+        self.spin_axes.restrict(&mut momentum);
         momentum
     }
 

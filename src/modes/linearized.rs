@@ -436,6 +436,18 @@ impl<'a> LinearizedMotion<'a> {
         self.stiffened.is_some() || self.leaf.leaf.in_moving_air()
     }
 
+    /// A vector without what hinges that hold the spin do not allow.
+    pub(super) fn restricted(&self, vector: &[c64]) -> Vec<c64> {
+        let mut restricted = vector.to_vec();
+        for held in self.leaf.spin_axes(self.state).iter() {
+            let [x, y, z, ..] = self.solver.unknowns(held.rod, 0);
+            let parts = || [x, y, z].into_iter().zip(held.axis.to_array());
+            let along: c64 = parts().map(|(at, axis)| vector[at] * axis).sum();
+            parts().for_each(|(at, axis)| restricted[at] -= along * axis);
+        }
+        restricted
+    }
+
     /// A vector as increments of the nodes.
     fn field(&self, vector: &[f64]) -> NodalField {
         let node = |j: usize, i: usize| self.solver.unknowns(j, i).map(|at| vector[at]);

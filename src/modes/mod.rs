@@ -30,6 +30,7 @@ use crate::motion::Physics;
 use crate::rod::{Section, Segment};
 use crate::run::Limit;
 use glam::{DMat3, DVec3};
+use std::borrow::Cow;
 
 /// How stiff rods are softened in the matrix, since a large stiffness loses digits.
 struct MatrixSoftening {
@@ -534,6 +535,10 @@ impl MassMatrix {
             let tensor = inertia.tensor(state.q[state.base(j) + i]);
             // Fixed components have no mass.
             let free = leaf.node_freedom(j, i);
+            let tensor = match i {
+                0 => leaf.tensor_across_joint(state, j, tensor),
+                _ => tensor,
+            };
             NodeMassBlock {
                 rod: j,
                 node: i,
@@ -755,6 +760,13 @@ impl Eigenpair {
 /// scenario's unit of time.
 pub fn eigenvalue(leaf: &DiscreteLeaf, state: &State, mode: &Eigenpair) -> f64 {
     let physics = Physics::new(&leaf.leaf);
-    let quotient = quotient(leaf, state, &mode.shape, &mode.forces);
-    quotient / mass(leaf, &physics, state, &mode.shape) * physics.time_unit.powi(-2)
+    let mut shape = Cow::Borrowed(&mode.shape);
+    // Hinges that hold the spin allow other increments in another state.
+    for held in leaf.spin_axes(state).iter() {
+        let base = &mut shape.to_mut()[state.base(held.rod)];
+        let across = held.across(rotation_part(base));
+        base[..3].copy_from_slice(&across.to_array());
+    }
+    let quotient = quotient(leaf, state, &shape, &mode.forces);
+    quotient / mass(leaf, &physics, state, &shape) * physics.time_unit.powi(-2)
 }

@@ -183,7 +183,10 @@ impl MotionPair {
     ) -> Option<c64> {
         let shift = leaf.neutral_shift();
         let (motion, _) = LinearizedMotion::new(leaf, physics, state, forces, shift)?;
-        let product = motion.polynomial(self.root * time_ratio, &self.shape);
-        Some(dot(&self.transposed_shape, &product.value))
+        // Hinges that hold the spin allow other increments in another state.
+        let [shape, transposed] =
+            [&self.shape, &self.transposed_shape].map(|shape| motion.restricted(shape));
+        let product = motion.polynomial(self.root * time_ratio, &shape);
+        Some(dot(&transposed, &product.value))
     }
 }

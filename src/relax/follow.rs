@@ -547,7 +547,7 @@ impl EquilibriumTracker {
         let points = own.points.iter().zip(&other.points);
         own.rods.len() == other.rods.len()
             && own.joined == other.joined
-            && own.base_held == other.base_held
+            && (&own.base_held, own.base_spin) == (&other.base_held, other.base_spin)
             && own.tissue.is_some() == other.tissue.is_some()
             && own.wind.is_none()
             && other.wind.is_none()

@@ -214,7 +214,7 @@ fn response(
     // In the matrix held components have a large stiffness, and a neighbor's coupling moves them a little.
     let solve = &mut |forces: &NodalField| {
         let mut nodes = solve(forces)?;
-        leaf.zero_held_components(&mut nodes);
+        leaf.zero_held_components(&carriers.spin_axes, &mut nodes);
         Some(nodes)
     };
     response.nodes = solve(&rhs)?;

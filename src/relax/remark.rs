@@ -211,14 +211,16 @@ remarks! {
         /// Loads without a potential that grow no farther beside all others.
         #[error(
             " at {part:.4} of {}: beyond, the leaf moves on, to another equilibrium or to none; give less of these loads, or \
-             simulate the motion",
-            loads_text(.loads)
+             simulate the motion{}",
+            loads_text(.loads), spin_text(*.spins)
         )]
         EndOfGrowth {
             /// The part of these loads that the leaf bears.
             part: f64,
             /// Keys of these loads.
             loads: Vec<&'static str>,
+            /// The vein that is free to spin on its hinge under them, if one is.
+            spins: Option<usize>,
         } = "end-of-growth",
         /// Loads that are large for the stiffness.
         #[error(
@@ -450,6 +452,16 @@ impl EquilibriumRemark {
             _ => None,
         }
     }
+}
+
+/// What to do where nothing keeps a vein from spinning.
+fn spin_text(vein: Option<usize>) -> String {
+    vein.map_or_else(String::new, |vein| {
+        format!(
+            "; the hinge of vein {} leaves it free to spin about its own tangent, and leaf.base_spin = \"held\" holds it",
+            vein + 1
+        )
+    })
 }
 
 impl RestObstacle {

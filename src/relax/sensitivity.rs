@@ -450,8 +450,9 @@ impl NeighbouringEquilibria {
         let leaf = &level.leaf;
         let near = |near: &NeighbouringScenario| {
             let own = Leaf::with_scale(Arc::clone(&near.scenario), leaf.leaf.scale);
-            let state = displace_along_response(level, rate, response, near.offset);
+            let mut state = displace_along_response(level, rate, response, near.offset);
             let mut there = DiscreteLeaf::new(&own, leaf.grid.clone());
+            there.settle_spins(&mut state);
             if own.in_wind() {
                 let drag = WithoutPotential::new(&there).wind_forces(&state);
                 there.add_nodal_loads(&drag);

@@ -225,16 +225,18 @@ fn shoot(
     let on_bases = errors.map(|errors| {
         let bases = || rods.iter().map(|rod| &rod.nodes[0]);
         let places: Vec<DVec3> = bases().map(|base| base.position).collect();
-        let wrench = |(base, held): (&NodeState, &BaseSupport)| Wrench {
+        let carries_moment =
+            |j: usize| scenario.base_held[j] != BaseSupport::Pinned || scenario.holds_base_spin(j);
+        let held: Vec<bool> = (0..scenario.rods.len()).map(carries_moment).collect();
+        let wrench = |(base, held): (&NodeState, &bool)| Wrench {
             force: base.rotation * base.n,
             moment: match held {
-                BaseSupport::Pinned => DVec3::ZERO,
-                BaseSupport::Clamped | BaseSupport::Elastic => base.rotation * base.m,
+                true => base.rotation * base.m,
+                false => DVec3::ZERO,
             },
         };
-        let held = &scenario.base_held;
-        let wrenches: Vec<Wrench> = bases().zip(held).map(wrench).collect();
-        BaseReactions::from_each(&places, &wrenches, held, [errors.force, errors.moment])
+        let wrenches: Vec<Wrench> = bases().zip(&held).map(wrench).collect();
+        BaseReactions::from_each(&places, &wrenches, &held, [errors.force, errors.moment])
     });
     let (base_reactions, base_reaction) = on_bases.map_or((Vec::new(), None), |on_bases| {
         (on_bases.each, Some(on_bases.all))

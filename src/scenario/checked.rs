@@ -13,7 +13,7 @@ use crate::scenario::profile::Profile;
 use crate::scenario::schedule::Schedule;
 use crate::scenario::section::{Moduli, Property, Radii, Section};
 use crate::scenario::support_motion::SupportMotion;
-use crate::scenario::supports::{BaseSupport, Grip, HeldTip};
+use crate::scenario::supports::{BaseSpin, BaseSupport, Grip, HeldTip};
 use crate::scenario::veins::{Rod, Scale, Tissue};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -37,6 +37,8 @@ pub struct Scenario {
     /// The moment per radian by which the base of each rod is held in its natural direction if it is elastic;
     /// empty unless some base is.
     pub base_turn_stiffness: Vec<f64>,
+    /// Whether bases on hinges may spin.
+    pub base_spin: BaseSpin,
     /// Whether all tips share one point.
     pub joined: bool,
     /// Coupling stiffness of each gap between neighbouring rods along the lab
@@ -123,6 +125,11 @@ impl Scenario {
             BaseSupport::Elastic => self.base_turn_stiffness[j],
             BaseSupport::Clamped | BaseSupport::Pinned => 0.0,
         }
+    }
+
+    /// Whether the base of rod `j` is on a hinge that holds its spin.
+    pub fn holds_base_spin(&self, j: usize) -> bool {
+        self.base_spin == BaseSpin::Held && self.base_held[j] == BaseSupport::Pinned
     }
 
     /// The units that make the leaf dimensionless.

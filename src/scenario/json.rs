@@ -192,6 +192,7 @@ impl Scenario {
                 Some((first, others)) if others.iter().all(|other| other == first) => json!(first),
                 _ => json!(self.base_held),
             },
+            Key::BaseSpin => json!(self.base_spin),
             Key::BaseTurnStiffness if self.base_turn_stiffness.is_empty() => return None,
             Key::BaseTurnStiffness => number_or_list(self.base_turn_stiffness.iter().copied()),
             Key::Fan => list_value(self.rods.iter().map(|rod| rod.angle)),

@@ -58,7 +58,7 @@ pub use crate::scenario::read::{MOST_BYTES, bytes, decode_utf8, text};
 pub use crate::scenario::schedule::{InTime, Knots, Schedule, Sine};
 pub use crate::scenario::section::{Moduli, Radii, SectionConstants, SectionOutline, Stress};
 pub use crate::scenario::support_motion::{BaseMotion, SupportMotion};
-pub use crate::scenario::supports::{BaseSupport, Clamp, Grip, HeldTip, SupportKind};
+pub use crate::scenario::supports::{BaseSpin, BaseSupport, Clamp, Grip, HeldTip, SupportKind};
 pub use crate::scenario::veins::{Rod, Scale, Tissue, longest};
 pub use crate::scenario::zero_energy::{BaseRotations, UnbalancedMoment, ZeroEnergyRotation};
 /// Values as they can be written.

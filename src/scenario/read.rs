@@ -241,6 +241,7 @@ impl Entries {
             blade: source.blade().cloned(),
             base_held: bases.held,
             base_turn_stiffness: bases.turn_stiffness,
+            base_spin: bases.spin,
             joined,
             coupling,
             tissue,
@@ -355,6 +356,11 @@ fn check_masses_off_axis(entries: &Entries, scenario: &Scenario) -> ScenarioResu
         let mass = point.landing.map_or(point.mass, |landing| landing.mass);
         if point.is_off_axis() && mass > 0.0 {
             let item = entries.value_in_row(Key::PointOffset, row)?;
+            item.refuse_unless(
+                point.at > 0.0 || !scenario.holds_base_spin(point.vein),
+                "is of a mass at a base whose spin a hinge holds (leaf.base_spin), which no motion takes into account: \
+                 place the mass above the base",
+            )?;
             item.refuse_unless(
                 !swings_on_moving_support(scenario, point),
                 "is of a mass where a pinned holder moves in time, which would swing it: clamp the holder, or place \

@@ -5,6 +5,7 @@ use crate::scenario::format::Key;
 use crate::scenario::format::entries::Entries;
 use crate::scenario::format::error::ScenarioResult;
 use crate::scenario::schedule::Schedule;
+use crate::scenario::supports::BaseSpin;
 use glam::DVec3;
 
 /// How all bases move: from where they are at rest, which is where they are at time 0.
@@ -53,6 +54,12 @@ pub(super) fn read_support_motion(entries: &Entries) -> ScenarioResult<Option<Bo
         item.refuse_unless(
             entries.value_or_default(Key::Clamped)?.switch()?,
             "contradicts dynamics.clamped = false, a base that is free: leave one of them out",
+        )?;
+        let spin = entries.value_or_default(Key::BaseSpin)?.base_spin()?;
+        item.refuse_unless(
+            spin == BaseSpin::Free || turn.is_constant(),
+            "turns bases whose spin hinges hold (leaf.base_spin = \"held\"), which no motion takes into account: leave \
+             turn out, clamp the bases, or let them spin",
         )?;
         motion.base = Some(BaseMotion {
             displacement,

@@ -32,6 +32,17 @@ words! {
     }
 }
 
+words! {
+    /// Whether bases on hinges may spin about their own tangents.
+    pub enum BaseSpin {
+        /// They may.
+        Free = "free",
+        /// They may not: the frame of a base is turned from its natural one by the shortest turn of its tangent, as by a
+        /// constant-velocity joint.
+        Held = "held",
+    }
+}
+
 /// How far holders may take a leaf from its natural shape.
 struct SupportLimits {
     /// Largest distance of a held tip from the base, in lengths of the longest rod with its growth.
@@ -238,6 +249,11 @@ impl Grip {
 }
 
 impl EntryValue<'_> {
+    /// One of the words of a [`BaseSpin`].
+    pub(super) fn base_spin(&self) -> ScenarioResult<BaseSpin> {
+        self.word("must be \"free\" or \"held\" (hinges let a vein swing, and not spin)")
+    }
+
     /// One of the words of a [`SupportKind`].
     fn support_kind(&self) -> ScenarioResult<SupportKind> {
         self.word("must be \"pinned\" (the position is held) or \"clamped\" (the directions, too)")
@@ -250,9 +266,11 @@ pub(super) struct HeldBases {
     pub held: Vec<BaseSupport>,
     /// The stiffness of the spring of each rod, if it has one; empty unless some base is elastic.
     pub turn_stiffness: Vec<f64>,
+    /// Whether those on hinges may spin.
+    pub spin: BaseSpin,
 }
 
-/// Reads `leaf.base_held` and `leaf.base_turn_stiffness` of so many rods.
+/// Reads `leaf.base_held`, `leaf.base_spin` and `leaf.base_turn_stiffness` of so many rods.
 pub(super) fn read_base_support(entries: &Entries, rods: usize) -> ScenarioResult<HeldBases> {
     let item = entries.value_or_default(Key::BaseHeld)?;
     let held: Vec<BaseSupport> = item.word_for_each(
@@ -283,9 +301,16 @@ pub(super) fn read_base_support(entries: &Entries, rods: usize) -> ScenarioResul
         }
         (false, None) => Vec::new(),
     };
+    let item = entries.value_or_default(Key::BaseSpin)?;
+    let spin = item.base_spin()?;
+    item.refuse_unless(
+        spin == BaseSpin::Free || held.contains(&BaseSupport::Pinned),
+        "belongs to bases on hinges, as clamps and springs hold the spin themselves: add leaf.base_held = \"pinned\"",
+    )?;
     Ok(HeldBases {
         held,
         turn_stiffness,
+        spin,
     })
 }
 

@@ -127,6 +127,7 @@ fn all_that_is_given_arrives() {
 fn what_is_written_is_read_again_as_the_same() {
     let table = "
         =>
+        leaf.base_spin=held =>
         load.distributed=[0, 0, 1e-4] =>
         load.distributed=[[0, 0, 1e-4], [0, 0, 0], [0, 1e-5, 0]] =>
         load.distributed={at = [0, 1], value = [[[0, 0, 0], [0, 0, 1e-4]], [[0, 0, 0], [0, 0, 0]], [[0, 0, 0], [1e-4, 0, 0]]]} =>
@@ -264,6 +265,8 @@ fn what_cannot_be_is_refused() {
         leaf.base_held=free => must be "clamped"
         leaf.base_held=["clamped", "elastic", "clamped"]; leaf.base_turn_stiffness=[0, 0, 0] => leaf.base_turn_stiffness, entry 2 = 0: must be greater than 0
         leaf.base_held=["clamped", "elastic", "clamped"]; leaf.base_turn_stiffness=[-1, 1, 0] => entry 1 = -1: must not be negative
+        leaf.base_held=clamped; leaf.base_spin=held => add leaf.base_held = "pinned"
+        leaf.base_spin=loose => must be "free" or "held"
         tissue.along=-1 => must not be negative
         tissue.along=[1, 2, 3] => has 3 entries: must have 2, one per gap
         tissue.across=1e30 => gives k L^4/A

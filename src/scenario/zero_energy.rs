@@ -9,13 +9,15 @@
 //! On hinges a vein that is straight or round spins: every section turns about its own tangent,
 //! whatever its loads, as nothing but tissue or a clamp holds its sections. And a group of veins
 //! turns as a rigid body about the line through all points where it is held, if it is loaded along
-//! this line, whatever its sections. Rollers and foundations that hold along one axis alone let veins turn
+//! this line, whatever its sections. Hinges that hold the spin (`leaf.base_spin`) allow what clamps do: the turn about
+//! their natural direction with the sections back about their own tangents; and round veins that no tissue ties turn on
+//! them about any axis about which they would turn as a rigid body, each with a spin that depends on its shape. Rollers and foundations that hold along one axis alone let veins turn
 //! about this axis.
 
 #[cfg(test)]
 mod tests;
 
-use crate::rotation::angle_about;
+use crate::rotation::{HeldSpin, Pose, angle_about};
 use crate::scenario::checked::Scenario;
 use crate::scenario::profile::{Profile, RodPlace, knot_places};
 use crate::scenario::supports::{BaseSupport, Grip, SupportKind};
@@ -61,6 +63,9 @@ pub struct ZeroEnergyRotation {
     pub section_rate: f64,
     /// Whether the veins turn so also where they are bent.
     pub includes_bent_veins: bool,
+    /// Of veins whose bases are on hinges that hold their spin: the hinges, by which the rate of the sections of each vein
+    /// depends on its shape; empty of others.
+    pub joints: Vec<HeldSpin>,
 }
 
 /// Moments about a line about which nothing holds a group of veins.
@@ -145,19 +150,38 @@ impl ZeroEnergyRotation {
     }
 
     /// The rotations by this angle about the axis and, from the right, of sections about their own
-    /// tangents.
-    pub fn rotations(&self, angle: f64) -> [DQuat; 2] {
+    /// tangents, of vein `rod` of the leaf that begins with the rotation `base`.
+    pub fn rotations(&self, angle: f64, rod: usize, base: DQuat) -> [DQuat; 2] {
         let turn = match self.axis == DVec3::ZERO {
             true => DQuat::IDENTITY,
             false => DQuat::from_axis_angle(self.axis, angle),
         };
-        [turn, DQuat::from_rotation_x(self.section_rate * angle)]
+        let back = match self.joint_of(rod) {
+            None => DQuat::from_rotation_x(self.section_rate * angle),
+            Some(joint) => (turn * base).conjugate() * joint.settled(turn * base),
+        };
+        [turn, back]
     }
 
-    /// The angular velocity and the velocity, at unit rate, of a node in the position `x`, whose unit of
-    /// length is `length`, with the rotation `q`.
-    pub fn node_velocity(&self, x: DVec3, q: DQuat, length: f64) -> [DVec3; 2] {
-        let spin = self.axis + self.section_rate * (q * DVec3::X);
+    /// The hinge of a vein, if it holds the spin.
+    fn joint_of(&self, rod: usize) -> Option<HeldSpin> {
+        self.joints.get(rod - self.rods.start).copied()
+    }
+
+    /// At unit rate about the axis, the rate of the sections of a vein that begins with the rotation `base`: where a hinge
+    /// holds the spin, the base then does not turn about the axis of the hinge.
+    fn section_rate_of(&self, rod: usize, base: DQuat) -> f64 {
+        self.joint_of(rod).map_or(self.section_rate, |joint| {
+            let held = joint.axis(base);
+            -self.axis.dot(held) / (base * DVec3::X).dot(held)
+        })
+    }
+
+    /// The angular velocity and the velocity, at unit rate, of a node of vein `rod`, which begins with the rotation `base`,
+    /// at this pose, whose unit of length is `length`.
+    pub fn node_velocity(&self, node: Pose, rod: usize, base: DQuat, length: f64) -> [DVec3; 2] {
+        let (x, d1) = (node.position, node.rotation * DVec3::X);
+        let spin = self.axis + self.section_rate_of(rod, base) * d1;
         [spin, self.axis.cross(x - self.point / length)]
     }
 }
@@ -173,15 +197,18 @@ impl Scenario {
         for rods in self.tied_groups() {
             let windy = self.wind.is_some();
             let between_clamps = self.axis_between_clamps(rods.clone()).filter(|_| !windy);
+            let as_on_clamps = between_clamps.is_some();
             rotations.extend(between_clamps.map(|axis| ZeroEnergyRotation {
                 rods: rods.clone(),
                 point: DVec3::ZERO,
                 axis,
                 section_rate: -1.0,
                 includes_bent_veins: true,
+                joints: Vec::new(),
             }));
             // Rigid turns before spins: to lean, a vein spins back from where it has turned to as a whole.
             let rigid = self.rigid_rotation(&rods).filter(|_| !windy);
+            let rigid = rigid.filter(|it| it.joints.is_empty() || !as_on_clamps);
             rotations.extend(rigid);
             rotations.extend(
                 rods.filter(|j| self.spins(*j))
@@ -196,6 +223,11 @@ impl Scenario {
         self.base_held[vein] == BaseSupport::Pinned
     }
 
+    /// Whether the base of a vein turns freely, and about its own tangent, too.
+    fn base_spins(&self, vein: usize) -> bool {
+        self.is_pinned(vein) && !self.holds_base_spin(vein)
+    }
+
     /// Whether every section of a vein is on a hinge and can turn about its own tangent, provided that the
     /// vein is round or straight.
     fn spins(&self, vein: usize) -> bool {
@@ -203,12 +235,23 @@ impl Scenario {
         let tissue = |gap| (self.tissue.iter()).any(|all| all.get(gap).is_some_and(has_some));
         let clamps = |grip: &Grip| grip.vein == vein && grip.held == SupportKind::Clamped;
         let tip = self.held_tip.as_ref();
-        self.is_pinned(vein)
+        self.base_spins(vein)
             && tip.is_none_or(|held| held.clamps.is_none())
             && !gaps.clone().any(tissue)
             && !self.grips.iter().any(clamps)
             && !self.has_moments_on(&(vein..vein + 1))
             && !self.has_levers_on(&(vein..vein + 1))
+    }
+
+    /// The first vein that may spin on its hinge and on which moments act that turn with its sections, or along it, if
+    /// there is one: nothing need balance them.
+    pub fn vein_driven_to_spin(&self) -> Option<usize> {
+        let on_points = |vein: usize| {
+            let mut points = self.points.iter();
+            points.any(|it| it.vein == vein && it.follows && it.moment != [0.0; 3])
+        };
+        (0..self.rods.len())
+            .find(|vein| (self.couple.is_some() || on_points(*vein)) && self.spins(*vein))
     }
 
     fn spin_rotation(&self, vein: usize) -> ZeroEnergyRotation {
@@ -218,6 +261,7 @@ impl Scenario {
             axis: DVec3::ZERO,
             section_rate: 1.0,
             includes_bent_veins: is_round(&self.rods[vein]),
+            joints: Vec::new(),
         }
     }
 
@@ -226,12 +270,26 @@ impl Scenario {
     fn rigid_rotation(&self, group: &Range<usize>) -> Option<ZeroEnergyRotation> {
         let apart = self.support_offsets(group)?;
         let axis = self.axis_between_hinges(group, &apart)?;
-        (!self.has_moments_on(group)).then(|| ZeroEnergyRotation {
+        let spins = group.clone().all(|vein| self.base_spins(vein));
+        // Where the spin of bases is held, veins spin as they turn, which only round ones do that no tissue ties.
+        let bases = &self.rods[group.clone()];
+        let turns_on_joints = || {
+            bases.iter().all(is_round) && !self.has_levers_on(group) && !self.has_tissue_in(group)
+        };
+        let joint = |rod: &Rod| HeldSpin {
+            natural: rod.base_rotation(),
+        };
+        let turns = !self.has_moments_on(group) && (spins || turns_on_joints());
+        turns.then(|| ZeroEnergyRotation {
             rods: group.clone(),
             point: self.rods[group.start].base_position(),
             axis,
             section_rate: 0.0,
             includes_bent_veins: true,
+            joints: match spins {
+                true => Vec::new(),
+                false => bases.iter().map(joint).collect(),
+            },
         })
     }
 
@@ -261,6 +319,10 @@ impl Scenario {
         }
         self.tied_groups().into_iter().find_map(|group| {
             let apart = self.support_offsets(&group)?;
+            // A hinge that holds the spin balances moments, too.
+            if !group.clone().all(|vein| self.base_spins(vein)) {
+                return None;
+            }
             let moments = self.group_moments(&group);
             let whole: DVec3 = moments.iter().sum();
             let size: f64 = moments.iter().map(|moment| moment.length()).sum();
@@ -360,7 +422,9 @@ impl Scenario {
         let free = |group: Range<usize>| {
             let apart = self.support_offsets(&group);
             let points = |apart: Vec<DVec3>| self.support_line(&group, &apart).is_some();
-            !self.has_moments_on(&group) && apart.is_some_and(|apart| !points(apart))
+            // Moments without a line are refused, but where hinges that hold the spin could balance them.
+            let spins = group.clone().all(|vein| self.base_spins(vein));
+            !(spins && self.has_moments_on(&group)) && apart.is_some_and(|apart| !points(apart))
         };
         let determined = self.wind.is_some() || self.has_followers();
         !determined && self.tied_groups().into_iter().any(free)
@@ -389,6 +453,12 @@ impl Scenario {
     fn has_levers_on(&self, group: &Range<usize>) -> bool {
         let mut points = self.points.iter().filter(|it| group.contains(&it.vein));
         points.any(|point| point.is_off_axis() && self.force_on(point) != [0.0; 3])
+    }
+
+    /// Whether tissue ties veins of a group.
+    fn has_tissue_in(&self, group: &Range<usize>) -> bool {
+        let mut tissue = self.tissue.iter();
+        tissue.any(|all| all[group.start..group.end - 1].iter().any(has_some))
     }
 
     /// The dead moments on a group of veins.
@@ -434,11 +504,12 @@ impl Scenario {
         let clamp = clamps.map(|clamps| clamps[group.start].rotation() * DVec3::X);
         // Where grips hold a vein depends on how it begins in the natural leaf.
         let without_grips = grips.clone().next().is_none();
-        let free = |vein: usize| self.is_pinned(vein) && without_grips;
+        // A hinge that holds the spin allows what a clamp does: turns about n, with the sections back about their own.
+        let free = |vein: usize| self.base_spins(vein) && without_grips;
         let axis = match group.clone().find(|vein| !free(*vein)) {
             None => clamp?,
             Some(_)
-                if !gripped && clamp.is_none() && group.clone().all(|it| self.is_pinned(it)) =>
+                if !gripped && clamp.is_none() && group.clone().all(|it| self.base_spins(it)) =>
             {
                 return None;
             }
@@ -451,17 +522,12 @@ impl Scenario {
             let mut clamps = clamps.into_iter().flatten();
             along(held.position) && clamps.all(|clamp| in_line(clamp.rotation() * DVec3::X))
         });
-        let gaps = group.start..group.end - 1;
-        let tissue = self
-            .tissue
-            .iter()
-            .any(|all| all[gaps.clone()].iter().any(has_some));
         let begins = |vein: usize| {
             let rod = &self.rods[vein];
             (free(vein) || in_line(tangent(rod))) && is_along(rod.base_position(), axis)
         };
         let turns = group.clone().all(begins)
-            && !tissue
+            && !self.has_tissue_in(&group)
             && self.group_loads(&group).iter().all(|load| is_along(*load, axis))
             && grips.all(|grip| along(grip.displacement))
             && self.supports_are_isotropic(&group, axis)

@@ -22,8 +22,7 @@ mod tests;
 
 use crate::natural::Natural;
 use crate::rod::Wrench;
-use crate::rotation;
-use crate::rotation::Pose;
+use crate::rotation::{self, HeldSpin, Pose, outer};
 use crate::run::Limit;
 use crate::scenario::{
     BaseSupport, PointLoad, Profile, RodPlace, Scenario, ZeroEnergyRotation, longest,
@@ -31,7 +30,8 @@ use crate::scenario::{
 use crate::shape::NodeState;
 use crate::shooting::follower_loads::FollowerLoads;
 use crate::shooting::rod_state::{
-    JumpDerivatives, RodState, STATE_SIZE, SlopeDerivatives, cross_matrix, rotation_difference,
+    FreeBaseChanges, JumpDerivatives, RodState, STATE_SIZE, SlopeDerivatives, cross_matrix,
+    rotation_difference,
 };
 use crate::shooting::tissue::{FrameRates, TissueEnergy};
 use crate::shooting::tissue_stresses::{RodSection, TissueState};
@@ -588,13 +588,55 @@ impl BoundaryValueProblem<'_> {
     }
 
     /// The derivative of the [moment at the base](Self::constrained_base) of rod `j` by the rotation of that.
-    pub fn base_moment_rate(&self, j: usize, q: DQuat) -> DMat3 {
+    fn base_moment_rate(&self, j: usize, q: DQuat) -> DMat3 {
         self.base_turn_stiffness(j) * rotation::log_rate(self.base_turn(j, q))
     }
 
-    /// The state at the base nearest to a given one: a hinge carries no moment, or that of its spring.
+    /// Whether the base of rod `j` turns on a hinge that holds its spin.
+    pub fn holds_base_spin(&self, j: usize) -> bool {
+        self.scenario.holds_base_spin(j)
+    }
+
+    /// The joint at the base of rod `j`, if a hinge holds its spin.
+    fn base_joint(&self, j: usize) -> Option<HeldSpin> {
+        let natural = self.scenario.base(j).1;
+        self.holds_base_spin(j).then_some(HeldSpin { natural })
+    }
+
+    /// How the rotation and the moment of the base of rod `j` change with the three numbers that are free there beside
+    /// the force: with the rotation of a base that turns, by which the moment of its spring changes, too. Where a hinge
+    /// holds the spin, the numbers are the rotation across the axis a of the hinge and the change of the moment along
+    /// it, in the softest stiffness: with P = 1 - a a^T the rotation is P, and the moment mu a changes by
+    /// a a^T + mu a' P, a' being the derivative of a.
+    pub fn free_base_changes(&self, j: usize, base: &RodState) -> FreeBaseChanges {
+        match self.base_joint(j) {
+            None => FreeBaseChanges {
+                rotation: DMat3::IDENTITY,
+                moment: self.base_moment_rate(j, base.q),
+            },
+            Some(joint) => {
+                let axis = joint.axis(base.q);
+                let along = outer(axis, axis);
+                let across = DMat3::IDENTITY - along;
+                let turned = base.m.dot(axis) * joint.axis_rate(base.q) * across;
+                FreeBaseChanges {
+                    rotation: across,
+                    moment: self.softest_couple_stiffness[j] * along + turned,
+                }
+            }
+        }
+    }
+
+    /// The state at the base nearest to a given one: a hinge carries no moment but, if it holds the spin, that about its
+    /// axis, or that of its spring.
     pub fn constrained_base(&self, j: usize, rod: &RodState) -> RodState {
         let clamped = self.base(j, rod.n, rod.m);
+        if let Some(joint) = self.base_joint(j) {
+            let q = joint.settled(rod.q);
+            let axis = joint.axis(q);
+            let m = rod.m.dot(axis) * axis;
+            return RodState { q, m, ..clamped };
+        }
         match self.base_turns(j) {
             true => RodState {
                 q: rod.q,

@@ -16,7 +16,7 @@ use crate::shooting::integrate::{
     InitialValueIntegrator, LeafTrajectory, ResultantSizes, ShootingNodes, UnboundedSolution,
 };
 use crate::shooting::rod_state::{
-    JumpDerivatives, PERTURBATION_SIZE, RodState, rotation_difference,
+    FreeBaseChanges, JumpDerivatives, PERTURBATION_SIZE, RodState, rotation_difference,
 };
 use crate::shooting::sensitivities::{LinearStep, Perturbations, coupled_rods};
 use faer::{Col, ColRef, Mat};
@@ -196,9 +196,8 @@ pub fn responses(
                     let rods = coupled_rods(equations, j);
                     let mut all = Perturbations::<6>::unit_perturbations(rods, j, first);
                     if equations.base_turns(j) {
-                        // With a base turns the moment of its spring.
-                        let q = RodState::from_flat_state(base, j).q;
-                        all.add_moments_of_rotations(j, equations.base_moment_rate(j, q));
+                        let base = RodState::from_flat_state(base, j);
+                        all.set_base_changes(j, &equations.free_base_changes(j, &base));
                     }
                     perturbation_responses(equations, steps, all)
                 }
@@ -369,6 +368,30 @@ const UNDETERMINED_SINGULAR_RATIO: f64 = 1e-10;
 /// above which they are this turn.
 const ZERO_ENERGY_COSINE: f64 = 0.9;
 
+/// What is free at the base of a rod.
+struct FreeAtBase {
+    /// The first of the components of its perturbation that are free.
+    first: usize,
+    /// If a hinge holds its spin, its changes with the first three numbers, in the units. Otherwise these are the
+    /// components, and the moment of a spring follows from the rotation.
+    changes: Option<FreeBaseChanges>,
+}
+
+impl FreeAtBase {
+    /// The perturbation of the base by six numbers that are free there.
+    fn perturbation(&self, free: [f64; 6]) -> [f64; PERTURBATION_SIZE] {
+        let mut all = [0.0; PERTURBATION_SIZE];
+        let kept = PERTURBATION_SIZE.min(self.first + 6);
+        all[self.first..kept].copy_from_slice(&free[..kept - self.first]);
+        if let Some(changes) = &self.changes {
+            let turn = DVec3::new(free[0], free[1], free[2]);
+            all[3..6].copy_from_slice(&(changes.rotation * turn).to_array());
+            all[9..].copy_from_slice(&(changes.moment * turn).to_array());
+        }
+        all
+    }
+}
+
 /// The condensed equations, factorized.
 pub struct CondensedEquations {
     maps: Vec<Mat<f64>>,
@@ -384,8 +407,8 @@ pub struct CondensedEquations {
     /// turn without resistance, and the forces between joint tips that rigid tissue carries as well.
     determined: usize,
     tip: TipConstraint,
-    /// The first of the components that are free at the base.
-    free_at_base: Vec<usize>,
+    /// What is free at the base of every rod.
+    free_at_base: Vec<FreeAtBase>,
     units: PerturbationUnits,
     /// Derivatives of what loads on points at the tips add to n and m there; empty if these do not depend on
     /// rotations.
@@ -395,10 +418,12 @@ pub struct CondensedEquations {
 impl CondensedEquations {
     /// Propagates the sensitivities to the tip. `None` if they are not finite. The `turns` of
     /// veins that can turn without resistance, at the base, are left undetermined where they are
-    /// what the conditions determine least. `tip_jumps` are the derivatives of the loads on points at the tips.
+    /// what the conditions determine least. `tip_jumps` are the derivatives of the loads on points at the tips;
+    /// `base` is the state at the bases.
     pub fn new(
         equations: &BoundaryValueProblem,
         units: &PerturbationUnits,
+        base: &[f64],
         maps: Vec<Mat<f64>>,
         turns: &[Vec<f64>],
         tip_jumps: Vec<JumpDerivatives>,
@@ -423,6 +448,17 @@ impl CondensedEquations {
         let svd = conditions.svd().ok()?;
         let all = svd.S().column_vector().nrows();
         let determined = all - equations.redundant_tip_conditions();
+        let of_base = |j: usize| FreeAtBase {
+            first: equations.first_free_component(j),
+            changes: equations.holds_base_spin(j).then(|| {
+                let changes = equations.free_base_changes(j, &RodState::from_flat_state(base, j));
+                let unit = units.component_unit(PERTURBATION_SIZE * j + 9);
+                FreeBaseChanges {
+                    moment: changes.moment * unit.recip(),
+                    ..changes
+                }
+            }),
+        };
         let mut march = CondensedEquations {
             maps,
             bases,
@@ -432,9 +468,7 @@ impl CondensedEquations {
             right: svd.V().to_owned(),
             determined,
             tip,
-            free_at_base: (0..equations.rods())
-                .map(|j| equations.first_free_component(j))
-                .collect(),
+            free_at_base: (0..equations.rods()).map(of_base).collect(),
             units: units.clone(),
             tip_jumps,
         };
@@ -538,13 +572,10 @@ impl CondensedEquations {
             free -= &shifts[k];
             back_substitute(&self.growths[k], &mut free);
         }
-        // At the base six components are free.
-        let base = self.free_at_base.iter().enumerate().flat_map(|(j, first)| {
-            let free = &free;
-            (0..PERTURBATION_SIZE).map(move |k| match k.checked_sub(*first) {
-                Some(k) if k < 6 => free[6 * j + k],
-                _ => 0.0,
-            })
+        // At the base six numbers are free.
+        let bases = self.free_at_base.iter().enumerate();
+        let base = bases.flat_map(|(j, of_base)| {
+            of_base.perturbation(std::array::from_fn(|k| free[6 * j + k]))
         });
         increments.push(base.collect());
         increments.reverse();

@@ -19,7 +19,7 @@ use crate::shooting::intervals::{
 };
 use crate::shooting::rod_state::{PERTURBATION_SIZE, RodState};
 use crate::shooting::{CorrectionProgress, NeutralDirection, ShootingFailureReason, ShootingLog};
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 use std::f64::consts::LOG10_E;
 
 /// What controls Newton's method. Corrections are in the units of the unknowns.
@@ -339,6 +339,7 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
         self.condensed = CondensedEquations::new(
             self.equations,
             &self.units,
+            &base,
             maps,
             &self.zero_energy_changes(),
             self.equations.tip_jump_derivatives(&last.end_state),
@@ -360,7 +361,8 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
                 let rod = RodState::from_flat_state(base, j);
                 let unit = |k: usize| self.units.component_unit(PERTURBATION_SIZE * j + k);
                 let (force, moment) = (axis.cross(rod.n) / unit(6), axis.cross(rod.m) / unit(9));
-                let [spin, _] = turning.node_velocity(rod.r, rod.q, self.equations.length_unit);
+                let [spin, _] =
+                    turning.node_velocity(rod.pose(), j, rod.q, self.equations.length_unit);
                 let own = &mut turn[PERTURBATION_SIZE * j..PERTURBATION_SIZE * (j + 1)];
                 // A clamp does not turn.
                 if self.equations.base_turns(j) {
@@ -398,16 +400,18 @@ impl<'e, 'a, 'p> ShootingNewton<'e, 'a, 'p> {
             let directed = (rods.clone()).filter(|j| !self.equations.base_turns_freely(*j));
             let moments = directed.map(|j| bases(j).m).reduce(|sum, own| sum + own);
             let angle = turning.angle_to_representative(&begins, moments);
-            let [turn, back] = turning.rotations(angle);
+            let turns: Vec<[DQuat; 2]> = (rods.clone())
+                .map(|j| turning.rotations(angle, j, bases(j).q))
+                .collect();
             let point = turning.point / self.equations.length_unit;
             for (k, state) in self.nodes.states.iter_mut().enumerate() {
-                for j in rods.clone() {
+                for (j, [turn, back]) in rods.clone().zip(&turns) {
                     let rod = RodState::from_flat_state(state, j);
                     let turned = RodState {
-                        r: point + turn * (rod.r - point),
-                        q: turn * rod.q * back,
-                        n: turn * rod.n,
-                        m: turn * rod.m,
+                        r: point + *turn * (rod.r - point),
+                        q: *turn * rod.q * *back,
+                        n: *turn * rod.n,
+                        m: *turn * rod.m,
                     };
                     let turned = match k {
                         0 => self.equations.constrained_base(j, &turned),

@@ -123,6 +123,13 @@ impl AddAssign for JumpDerivatives {
     }
 }
 
+/// The changes of rotation and moment at a base that turns with three numbers that are free there.
+#[derive(Clone, Copy, Debug)]
+pub struct FreeBaseChanges {
+    pub rotation: DMat3,
+    pub moment: DMat3,
+}
+
 /// Derivatives of n' and m' by loads without a potential.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct LoadDerivatives {

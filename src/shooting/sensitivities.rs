@@ -6,7 +6,9 @@ use crate::natural::{RESULT_WEIGHTS, STAGE_NODES, STAGE_WEIGHTS, STAGES};
 use crate::scenario::RodPlace;
 use crate::shooting::equations::BoundaryValueProblem;
 use crate::shooting::integrate::{InitialValueIntegrator, weighted_slope_sum};
-use crate::shooting::rod_state::{JumpDerivatives, PERTURBATION_SIZE, SlopeDerivatives};
+use crate::shooting::rod_state::{
+    FreeBaseChanges, JumpDerivatives, PERTURBATION_SIZE, SlopeDerivatives,
+};
 use crate::shooting::tissue::{GapTangent, PAIR_PERTURBATION_SIZE};
 use crate::shooting::tissue_stresses::{LinearStresses, StressChanges, TissueState};
 use glam::DMat3;
@@ -91,13 +93,14 @@ impl<const W: usize> Perturbations<W> {
         }
     }
 
-    /// Adds, to perturbations of rod `j` of which the first three are rotations, the changes of the moment
-    /// that go with these.
-    pub fn add_moments_of_rotations(&mut self, j: usize, rate: DMat3) {
-        let first = PERTURBATION_SIZE * (j - self.rods.start) + 9;
-        for k in 0..3 {
-            for (c, change) in rate.col(k).to_array().into_iter().enumerate() {
-                self.entries[(first + c) * W + k] += change;
+    /// Sets the first three of the perturbations of rod `j` to these changes of rotation and moment, one a column.
+    pub fn set_base_changes(&mut self, j: usize, changes: &FreeBaseChanges) {
+        let first = PERTURBATION_SIZE * (j - self.rods.start);
+        for (part, matrix) in [(3, changes.rotation), (9, changes.moment)] {
+            for k in 0..3 {
+                for (c, change) in matrix.col(k).to_array().into_iter().enumerate() {
+                    self.entries[(first + part + c) * W + k] = change;
+                }
             }
         }
     }

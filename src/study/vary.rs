@@ -32,7 +32,7 @@ use crate::relax::Parameter;
 use crate::scenario;
 use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
 use crate::scenario::{
-    BaseSupport, Entries, EntryPath, Key, Scenario, ScenarioError, intended_number,
+    BaseSpin, BaseSupport, Entries, EntryPath, Key, Scenario, ScenarioError, intended_number,
 };
 use serde::{Serialize, Serializer};
 use std::fmt;
@@ -661,10 +661,11 @@ impl BaseScenario {
 }
 
 /// Whether forces on a leaf depend on numbers of its scenario otherwise than these say: by the stress-free leaf, by the
-/// turn of an elastic base from its natural direction, or by the square of the air's velocity.
+/// turn of an elastic base from its natural direction, by the frame that a hinge allows, or by the square of the air's velocity.
 fn has_nonlinear_forces(scenario: &Scenario) -> bool {
     let elastic = scenario.base_held.contains(&BaseSupport::Elastic);
-    scenario.needs_stress_free_leaf() || elastic || scenario.wind.is_some()
+    let joints = scenario.base_spin == BaseSpin::Held;
+    scenario.needs_stress_free_leaf() || elastic || joints || scenario.wind.is_some()
 }
 
 /// The overrides that set these values.

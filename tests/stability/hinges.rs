@@ -19,6 +19,9 @@ const COLUMN: &str = r#"
     dynamics = { density = 1.0, rotary_inertia = 1e-10 }
 "#;
 
+/// Its base turns, and does not spin.
+const HELD_SPIN: &str = "leaf.base_spin=held";
+
 /// Roots of tan b = b.
 const TAN: [f64; 2] = [4.493409457909064, 7.725251836937707];
 
@@ -108,6 +111,55 @@ fn slender_beams_vibrate_as_euler_and_bernoulli_say() {
     }
 }
 
+/// On a hinge that holds the spin a column buckles as on another, and no direction is neutral before.
+#[test]
+fn a_held_spin_is_none_of_the_ways_to_buckle() {
+    for (other, ways) in [(1.0, 2), (1000.0, 1)] {
+        for (part, index) in [(0.999, 0), (1.001, ways)] {
+            let place = 1.0 - part * reissner(PI, 1e3, 400.0) / 1e3;
+            let at =
+                format!("stiffness.bending_2={other:?}; tip.position=[{place}, 0, 0]; {HELD_SPIN}");
+            let leaf = settle_on(base(COLUMN, &at).scenario(), 512, true);
+            assert_eq!(leaf.stability.negative_eigenvalues, Some(index), "{at}");
+            assert_eq!(leaf.stability.neutral_directions, 0, "{at}");
+        }
+    }
+}
+
+/// A beam on a hinge that holds the spin bends as on another hinge, and twists as in a clamp.
+#[test]
+fn a_held_spin_vibrates_as_in_a_clamp() {
+    let squares = |entries: &str| {
+        let entries = format!(
+            "dynamics.rotary_inertia=0.01; tip.position=[1.001, 0, 0]; stiffness.torsion=0.1; {entries}"
+        );
+        let options = Options {
+            mode_shapes: true,
+            ..with_modes(8, iterated(1e-10, 32))
+        };
+        let leaf = settled(base(COLUMN, &entries).scenario(), &options);
+        let modes = leaf.stability.modes.unwrap();
+        let twists = |mode: &Mode| largest(mode.displacement[0].iter().map(|d| d.length())) < 1e-6;
+        modes
+            .iter()
+            .map(|mode| (mode.eigenvalue, twists(mode)))
+            .collect::<Vec<_>>()
+    };
+    let [free, held, clamped] = ["", HELD_SPIN, "leaf.base_held=clamped"].map(squares);
+    let pick = |of: &[(f64, bool)], twists: bool| -> Vec<f64> {
+        let own = of.iter().filter(|it| it.1 == twists);
+        own.map(|it| it.0).collect()
+    };
+    for (other, twists) in [(&free, false), (&clamped, true)] {
+        let (ours, theirs) = (pick(&held, twists), pick(other, twists));
+        let both = ours.len().min(theirs.len());
+        assert!(both > 0, "{held:?} {other:?}");
+        for (a, b) in ours.iter().zip(&theirs) {
+            close("square of a frequency", *a, *b, 1e-7 * b);
+        }
+    }
+}
+
 /// Of leaves at rest on one grid the dense matrix, without a phase condition, has as many eigenvalues
 /// that are negative, and that are zero, as are told.
 #[test]
@@ -130,6 +182,17 @@ fn counts_are_those_of_the_dense_matrix() {
         &format!("{hanging}; {oval}"),
         &format!("{hanging}; rest.bend_3=0.4"),
         &format!("{hanging}; {oval}; rest.bend_3=0.4"),
+        HELD_SPIN,
+        &format!("tip.position=[0.95, 0, 0]; {HELD_SPIN}"),
+        &format!("tip.position=[0.95, 0, 0]; {oval}; {HELD_SPIN}"),
+        &format!("tip.position=[0.97, 0, 0]; load.gravity=[0, 1, -3]; {HELD_SPIN}"),
+        &format!("tip.position=[0.97, 0, 0]; load.gravity=[0, 1, -3]; {oval}; {HELD_SPIN}"),
+        &format!("tip.held=clamped; tip.position=[0.9, 0, 0]; {HELD_SPIN}"),
+        &format!("tip.position=[0.95, 0, 0]; leaf.fan=[0.4]; {HELD_SPIN}"),
+        &format!("tip.position=[0.8, 0, 0]; leaf.fan=[1.4]; leaf.base=[0.1, 0, 0]; {HELD_SPIN}"),
+        &format!("tip.position=[0.95, 0, 0]; leaf.fan=[0.4]; {oval}; {HELD_SPIN}"),
+        &format!("{hanging}; {HELD_SPIN}"),
+        &format!("{hanging}; {oval}; rest.bend_3=0.4; {HELD_SPIN}"),
     ] {
         let text = if entries.starts_with(hanging) {
             &free
@@ -174,13 +237,23 @@ const VEINS: &str = r#"
 /// Every point of a branch along which a hinge moves is the leaf that relaxes there.
 #[test]
 fn a_hinge_that_moves_is_followed() {
-    let found = follow(VEINS, "", "leaf.base[0][1]=-0.2..-0.1", false);
+    for (key, range, entries) in [
+        ("leaf.base[0][1]", "-0.2..-0.1", ""),
+        ("leaf.base[0][1]", "-0.2..-0.1", HELD_SPIN),
+        ("leaf.fan[0]", "0.2..0.5", HELD_SPIN),
+    ] {
+        is_followed(key, range, entries);
+    }
+}
+
+fn is_followed(key: &str, range: &str, entries: &str) {
+    let found = follow(VEINS, entries, &format!("{key}={range}"), false);
     assert!(found.complete, "{:?}", found.branches[0].remarks);
-    let key = "leaf.base[0][1]".parse().unwrap();
+    let key = key.parse().unwrap();
     let points = &found.branches[0].points;
     assert!(points.len() > 4 && points.iter().all(|point| point.index == 0));
     for point in points.iter().step_by(4) {
-        let leaf = base(VEINS, "")
+        let leaf = base(VEINS, entries)
             .scenario_with_values(&[(&key, point.value)])
             .unwrap();
         let leaf = settle(&leaf.scenario, 1e-9);
@@ -415,6 +488,8 @@ fn counts_of_veins_held_in_several_ways_are_those_of_the_dense_matrix() {
     "#;
     let clamp = "leaf.base_held=['clamped', 'pinned']";
     let spring = "leaf.base_held=['elastic', 'pinned']; leaf.base_turn_stiffness=2.0";
+    let held = "leaf.base_held=pinned; leaf.base_spin=held";
+    let beside = "leaf.base_held=['clamped', 'pinned']; leaf.base_spin=held";
     let apart = "leaf.joined=false";
     let in_line = "leaf.fan=[0.0, 0.0]; leaf.base=[[0.0, 0.0, 0.0], [0.2, 0.0, 0.0]]; \
                    load.gravity=[0, 0, 0]; load.tip_force=[-14.0, 0.0, 0.0]";
@@ -427,6 +502,13 @@ fn counts_of_veins_held_in_several_ways_are_those_of_the_dense_matrix() {
         (clamp, apart),
         (clamp, in_line),
         (spring, in_line),
+        (held, ""),
+        (held, "coupling.x=2; coupling.y=2; coupling.z=3"),
+        (held, "stiffness.bending_3=2.0"),
+        (held, apart),
+        (beside, ""),
+        (beside, apart),
+        (beside, in_line),
     ] {
         let leaf = base(VEINS, &format!("{held}; {entries}"));
         let scenario = leaf.scenario();

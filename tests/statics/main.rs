@@ -22,6 +22,7 @@ mod foundation;
 mod from_shape;
 mod grips;
 mod growth;
+mod held_spin;
 mod held_stretches;
 mod held_tips;
 mod helix;

@@ -24,7 +24,7 @@ pub use glam::DVec3;
 pub use leafdyn::internals::leaf::Leaf;
 use leafdyn::internals::leaf::Scale;
 pub use leafdyn::relax::{Equilibrium, Limit, Method, NodeState, Options, Outcome, RodShape};
-use leafdyn::scenario::{BaseSupport, Dynamics, Radii, Rod, Units};
+use leafdyn::scenario::{BaseSpin, BaseSupport, Dynamics, Radii, Rod, Units};
 pub use leafdyn::scenario::{Profile, Scenario, Schedule};
 pub use leafdyn::shape::Difference;
 use leafdyn::study::BaseScenario;
@@ -291,6 +291,7 @@ pub fn paper_leaf(rods: usize, couple: [f64; 3], force: [f64; 3], weight: f64) -
         radii: Radii::default(),
         base_held: vec![BaseSupport::Clamped; rods],
         base_turn_stiffness: Vec::new(),
+        base_spin: BaseSpin::Free,
         joined: true,
         coupling: vec![[0.0, 1.0, 1.0]; rods - 1],
         tissue: None,

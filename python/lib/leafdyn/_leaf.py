@@ -143,7 +143,7 @@ class Equilibrium(Viewed):
     @computed
     def base_reactions(self) -> list[tuple[Array, Array | None]]:
         """Of every vein the force that the support of its base feels, shape (3,), along the lab axes, and the moment about
-        the base; no moment on a hinge."""
+        the base; no moment on a hinge that does not hold the spin."""
         return self._core.base_reactions()
 
     @computed

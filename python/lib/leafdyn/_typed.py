@@ -101,6 +101,7 @@ class LeafTable(TypedDict, total=False):
 
     base: Numbers | Vectors
     base_held: str | Sequence[str]
+    base_spin: str
     base_turn_stiffness: float | Numbers
     elevation: float | Numbers
     fan: str | Numbers

@@ -32,6 +32,7 @@ impl DiscreteLeaf {
                 .map(|(j, i)| self.segment(state, j, i, state.n[j * n + i]))
                 .collect(),
             strips: self.rigid_strips(state),
+            spin_axes: self.spin_axes(state),
         }
     }
 
@@ -207,7 +208,7 @@ impl DiscreteLeaf {
             add_to_increment(&mut nodes[g + 1][i], -change.b, -change.x);
         }
         // Held components have no equations.
-        self.zero_held_components(nodes);
+        self.zero_held_components(&carriers.spin_axes, nodes);
     }
 
     /// The changes of the forces of all segments for increments of the nodes and changes of

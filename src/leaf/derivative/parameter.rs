@@ -97,11 +97,12 @@ impl<'s> LeafParameterDerivative<'s> {
                 false => base_rate(terms, j, scale.length),
             },
             held_base: match (leaf.hinged(), leaf.base_turns(j)) {
-                (true, true) => NodeIncrement {
+                // A joint that holds the spin turns its base as its natural frame turns.
+                (true, true) if !leaf.holds_base_spin(j) => NodeIncrement {
                     rotation: DVec3::ZERO,
                     ..base_rate(terms, j, scale.length)
                 },
-                (true, false) => base_rate(terms, j, scale.length),
+                (true, _) => base_rate(terms, j, scale.length),
                 (false, _) => none,
             },
             couple_stiffness: [0, 1, 2].map(|k| {

@@ -74,6 +74,7 @@ impl DiscreteLeaf {
                 }
             }
         }
+        self.add_joint_motion(state, &motion, forces);
         self.add_coupling_response(state, &motion, forces);
         self.add_strip_motion(&carriers.strips, &motion, forces);
         forces.support_increments = motion;
@@ -125,6 +126,22 @@ impl DiscreteLeaf {
         }
         let load = self.unbalanced_node_load(state, j, i);
         forces.energy -= load.force.dot(moved) + load.moment.dot(turned);
+    }
+
+    /// Adds the effect of joints that turn: the moment F of a base, which is along the axis of its joint, turns with it by
+    /// eta x F, of which the symmetric second derivatives of the energy leave eta x F/2 to be added.
+    fn add_joint_motion(&self, state: &State, motion: &NodalField, forces: &mut ParameterForces) {
+        if !self.holds_spins() {
+            return;
+        }
+        let count = self.moving_nodes().len();
+        for (j, rod) in motion.iter().enumerate() {
+            if let Some(by) = rod.first().filter(|_| self.leaf.holds_base_spin(j)) {
+                let held = self.support_load(state, j, 0).moment;
+                let moment = -0.5 * rotation_part(by).cross(held);
+                add_to_increment(&mut forces.rod_forces_mut(j, count)[0], moment, DVec3::ZERO);
+            }
+        }
     }
 
     /// Adds the changes of the forces of coupling and tissue by increments of the nodes. At a joint

@@ -294,6 +294,8 @@ impl MatrixFactors {
                     }
                 }
             }
+            // Velocities of before are across the axes of before.
+            system.spin_axes.restrict(&mut rhs);
         }
         system.set_solution(&self.solve_bordered(&rhs, &[]).increments);
     }

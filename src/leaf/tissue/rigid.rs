@@ -2,7 +2,7 @@
 //! finite stiffness in place of a rigid one.
 
 use crate::leaf::discrete::DiscreteLeaf;
-use crate::leaf::state::State;
+use crate::leaf::state::{SpinAxes, State};
 use crate::leaf::tissue::strips::{PlacedStrip, RIGID_TISSUE_RATIO, StripPlace, strip_ends};
 use crate::numbers::largest;
 use crate::rod::{Section, Segment, TissueStrip, Wrench};
@@ -22,6 +22,8 @@ pub struct ForceCarriers {
     pub segments: Vec<Segment>,
     /// The strips of all nodes, gap after gap; empty unless tissue is rigid.
     pub strips: Vec<RigidStrip>,
+    /// About which axes hinges hold bases.
+    pub spin_axes: SpinAxes,
 }
 
 /// A strip of a node as an element, by its rigid directions.

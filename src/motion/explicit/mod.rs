@@ -28,6 +28,7 @@
 //! the excess over the loads at time 0 is counted, which have a potential.
 
 mod applied_loads;
+mod joints;
 mod kernel;
 mod layout;
 mod moment_work;
@@ -372,8 +373,12 @@ impl Explicit {
         self.set_support_loads();
         let decay = 0.5 * self.physics.damping * length;
         let (keep, kick) = ((1.0 - decay) / (1.0 + decay), length / (1.0 + decay));
+        self.packs.iter_mut().for_each(Pack::begin_joint_step);
         self.move_packs(&loads, self.law(rest, remember), keep, kick, drift);
         work += self.drive_supports(drift);
+        let joints: f64 = (self.packs.iter_mut())
+            .map(|pack| pack.turn_joints(drift))
+            .sum();
         let (mut energy, mut friction, mut bent) = (0.0, 0.0, 0.0);
         for pack in &self.packs {
             energy += pack.totals.twice_kinetic;
@@ -404,7 +409,7 @@ impl Explicit {
                 }
             }
         }
-        energy -= self.return_sliding_nodes();
+        energy += joints - self.return_sliding_nodes();
         work += 0.5 * length * (before_kick + self.excess_load_power(&loads));
         if let Some(applied) = &self.applied {
             work += length * applied.power_of_followers(self.layout, &self.packs);

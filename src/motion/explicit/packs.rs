@@ -2,6 +2,7 @@
 
 use crate::leaf::{DiscreteLeaf, NodeFreedom, State};
 use crate::motion::Velocity;
+use crate::motion::explicit::joints::JointedBase;
 use crate::motion::explicit::kernel::{PackMotion, StepTotals, StrainHistory, WatchedNode};
 use crate::motion::explicit::layout::{
     AlignedArray, BlockMaterial, NODES_PER_BLOCK, NodeData, PackLayout, PackPosition,
@@ -9,6 +10,7 @@ use crate::motion::explicit::layout::{
 };
 use crate::motion::moving_supports::MovingSupports;
 use crate::motion::physics::Physics;
+use crate::rotation::align_quaternion_sign;
 use glam::{BVec3, DQuat, DVec3};
 use std::sync::Arc;
 
@@ -22,6 +24,8 @@ pub struct Pack {
     pub totals: StepTotals,
     /// Nodes whose supports move.
     pub watched: Vec<WatchedNode>,
+    /// Bases on hinges that hold their spin.
+    pub joints: Vec<JointedBase>,
 }
 
 /// Rotation and angular momentum of a node.
@@ -110,6 +114,14 @@ pub fn packs_at_rest(
     layout: PackLayout,
 ) -> Vec<Pack> {
     let node = |j, i| node_data(leaf, physics, j, i);
+    let joint = |j: usize| {
+        Some(JointedBase {
+            entry: layout.pack_position(j, 0).entry,
+            joint: leaf.leaf.base_joint(j)?,
+            inertia: physics.inertia(leaf, j, 0),
+            before: DVec3::ZERO,
+        })
+    };
     let materials = materials(layout, node).into_iter().enumerate();
     let packs = materials.map(|(p, material)| {
         let length = layout.pack_array_length();
@@ -143,6 +155,7 @@ pub fn packs_at_rest(
             },
             totals: StepTotals::default(),
             watched: Vec::new(),
+            joints: layout.pack_rods(p).filter_map(joint).collect(),
         }
     });
     packs.collect()
@@ -181,7 +194,8 @@ pub fn node_data(leaf: &DiscreteLeaf, physics: &Physics, j: usize, i: usize) -> 
     };
     if !free.is_fixed() {
         let inertia = physics.inertia(leaf, j, i);
-        if free.rotation {
+        // Bases on hinges that hold the spin are turned by themselves.
+        if free.rotation && !(i == 0 && leaf.leaf.holds_base_spin(j)) {
             node.inverse_inertia = inertia.principal.recip().to_array();
         }
         if free.displacement.any() && (i < n || !joined) {
@@ -256,6 +270,9 @@ impl Pack {
 
     /// Angular velocity of a node with rotation `q` and angular momentum `p`.
     pub fn angular_velocity(&self, at: usize, q: DQuat, p: DVec3) -> DVec3 {
+        if let Some(base) = self.joints.iter().find(|base| base.entry == at) {
+            return base.angular_velocity(q, p);
+        }
         let NodeMaterial { block, node } = self.node_material(at);
         let about = |axis: DVec3, excess: f64| axis * (axis.dot(p) * excess);
         let isotropic = p * block.inverse_inertia[node];
@@ -267,6 +284,35 @@ impl Pack {
                 isotropic + transverse + about(q * DVec3::Z, excess_3[node])
             }
         }
+    }
+
+    /// Notes the angular momenta of bases on hinges that hold the spin, before a kick.
+    pub fn begin_joint_step(&mut self) {
+        for base in &mut self.joints {
+            base.before = vector_at(&self.motion.p, base.entry);
+        }
+    }
+
+    /// Turns the bases on hinges that hold the spin for the time `drift` after a kick; returns twice the kinetic energy
+    /// that they had in its middle, at the mean of their angular momenta before and after it.
+    pub fn turn_joints(&mut self, drift: f64) -> f64 {
+        let mut energy = 0.0;
+        for k in 0..self.joints.len() {
+            let base = &self.joints[k];
+            let at = base.entry;
+            let (q, after) = (self.quaternion(at), vector_at(&self.motion.p, at));
+            let mean = 0.5 * (base.before + after);
+            energy += mean.dot(base.angular_velocity(q.normalize(), mean));
+            let (turned, momentum) = base.turned(q, after, drift);
+            let turned = align_quaternion_sign(turned, q);
+            for (array, value) in self.motion.q.iter_mut().zip(turned.to_array()) {
+                array[at] = value;
+            }
+            for (array, value) in self.motion.p.iter_mut().zip(momentum.to_array()) {
+                array[at] = value;
+            }
+        }
+        energy
     }
 
     /// The quaternion of a node, normalized at intervals only.

@@ -440,7 +440,23 @@ impl SemiImplicit {
                 next.w[c] = of_mean * (mean - w.alpha_f * m.w[c]);
             }
         }
+        self.hold_spins(true);
         set_support_motions(&self.supports, &mut self.next_node_motions);
+    }
+
+    /// Removes from the motions of bases, in the trial or in the state, what hinges that hold the spin do not allow: by
+    /// the differences in time it is not zero, but of higher order in the step.
+    fn hold_spins(&mut self, trial: bool) {
+        let (state, motions) = match trial {
+            true => (&self.trial, &mut self.next_node_motions),
+            false => (&self.state, &mut self.node_motions),
+        };
+        for held in self.leaf.spin_axes(state).iter() {
+            let motion = &mut motions[state.base(held.rod)];
+            for rate in [&mut motion.v, &mut motion.a, &mut motion.w] {
+                rate[0] = held.across(rate[0]);
+            }
+        }
     }
 
     /// Attempts a step of h; returns its local error, or `None` if it was too long.
@@ -576,6 +592,7 @@ impl SemiImplicit {
         }
         if scheduled || change != Loads::default() {
             self.add_off_axis_accelerations(change);
+            self.hold_spins(false);
         }
     }
 
@@ -752,8 +769,12 @@ fn add_inertia(
         for i in system.first_node()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
+            let free_tensor = match i == 0 && leaf.holds_spins() {
+                true => leaf.tensor_across_joint(state, j, tensor),
+                false => tensor,
+            };
             let stiffness = DiagonalBlocks {
-                rotary: tensor * per_mass,
+                rotary: free_tensor * per_mass,
                 translational: inertia[k].mass * per_mass,
             };
             system.add_to_node(j, i, stiffness, load(k, &tensor));
@@ -762,6 +783,7 @@ fn add_inertia(
             }
         }
     }
+    system.clear_held_spins();
 }
 
 impl SemiImplicit {

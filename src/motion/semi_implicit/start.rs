@@ -167,7 +167,11 @@ impl SemiImplicit {
             let v = self.node_motions[k].v;
             let momentum = tensor * v[0];
             let moment = moment - v[0].cross(momentum) - damping * momentum;
-            let w = [tensor.inverse() * moment, force / mass - damping * v[1]];
+            let angular = match i == 0 && self.leaf.holds_spins() {
+                true => self.leaf.joint_acceleration(&self.state, j, tensor, moment),
+                false => tensor.inverse() * moment,
+            };
+            let w = [angular, force / mass - damping * v[1]];
             self.node_motions[k] = NodeMotion { v, a: w, w };
         }
         if joined {

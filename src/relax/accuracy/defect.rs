@@ -439,7 +439,12 @@ fn satisfy_tip_conditions(leaf: &DiscreteLeaf, known: &mut [Vec<RodFields>]) {
     }
     let turning = |(j, _): &(usize, &mut Vec<RodFields>)| leaf.leaf.base_turns(*j);
     for (j, rod) in known.iter_mut().enumerate().filter(turning) {
-        rod[0].m = leaf.leaf.base_spring_moment(j, rod[0].q);
+        // Corrections are across the axes of hinges on a grid, which differ from those of these fields.
+        if let Some(joint) = leaf.leaf.base_joint(j) {
+            rod[0].q = joint.settled(rod[0].q);
+        }
+        let RodFields { q, m, .. } = rod[0];
+        rod[0].m = leaf.leaf.base_spring_moment(j, q) + leaf.leaf.joint_moment(j, q, m);
     }
     let mut tips: Vec<_> = known.iter_mut().filter_map(|rod| rod.last_mut()).collect();
     let held = leaf.leaf.tip_support.as_ref();

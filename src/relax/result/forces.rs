@@ -7,7 +7,7 @@ use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richa
 use crate::relax::accuracy::transfer::{GridLevel, NodalResultants};
 use crate::relax::accuracy::{FieldErrors, NestedEquilibrium};
 use crate::rod::Wrench;
-use crate::scenario::{BaseSupport, Grip, Moduli, Scenario, Stress, SupportKind};
+use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
 use crate::shape::{RodShape, STATION_TOLERANCE};
 use glam::DVec3;
 use serde::Serialize;
@@ -90,7 +90,7 @@ pub struct GripReaction {
 pub struct BaseReaction {
     /// The force.
     pub force: DVec3,
-    /// The moment about the base, none on a hinge; on all supports together about the mean of the bases.
+    /// The moment about the base, none on a hinge on which it may spin; on all supports together about the mean of the bases.
     pub moment: Option<DVec3>,
     /// Bound on the error of the force; `None` on a single grid that was not integrated along its rods.
     pub error: Option<f64>,
@@ -107,16 +107,16 @@ pub struct BaseReactions {
 }
 
 impl BaseReactions {
-    /// Those on bases at these `places` that are `held` so, from force and moment on each and bounds on the
+    /// Those on bases at these `places`, `held` those that carry moments, from force and moment on each and bounds on the
     /// errors of any force and of any moment; all in the units of the scenario.
     pub fn from_each(
         places: &[DVec3],
         on_bases: &[Wrench],
-        held: &[BaseSupport],
+        held: &[bool],
         [error, moment_error]: [f64; 2],
     ) -> Self {
         let each = on_bases.iter().zip(held).map(|(on_base, held)| {
-            let directed = *held != BaseSupport::Pinned;
+            let directed = *held;
             BaseReaction {
                 force: on_base.force,
                 error: Some(error),
@@ -161,9 +161,9 @@ struct IntegratedBases {
 
 impl IntegratedBases {
     fn new(leaf: &DiscreteLeaf, FieldErrors { estimate, safety }: FieldErrors) -> Self {
-        let on_base = |j: usize, moment: DVec3| match leaf.leaf.base_turns_freely(j) {
-            true => DVec3::ZERO,
-            false => moment,
+        let on_base = |j: usize, moment: DVec3| match leaf.leaf.base_carries_moment(j) {
+            true => moment,
+            false => DVec3::ZERO,
         };
         let rods = estimate.rods.iter().enumerate();
         let wrenches = rods.map(|(j, rod)| Wrench {
@@ -416,7 +416,7 @@ impl NestedEquilibrium {
         let bar = |error: Option<f64>, unit: f64| error.map(|error| safety * error * unit);
         let each = forces.value.iter().zip(&moments.value).enumerate();
         let each = each.map(|(j, (force, moment))| {
-            let directed = !leaf.leaf.base_turns_freely(j);
+            let directed = leaf.leaf.base_carries_moment(j);
             BaseReaction {
                 force: *force * scale.force(),
                 error: bar(forces.error, scale.force()),

@@ -395,8 +395,7 @@ pub fn outcome(
 const STRAIGHT_SPAN_TOLERANCE: f64 = 1e-9;
 
 /// An inextensible vein that two holders, neighbours along it, keep straight. What pulls it aside
-/// would need infinite forces along it, and any force along it is in balance. A vein that shears reaches farther than it is
-/// long.
+/// would need infinite forces along it, and any force along it is in balance. A vein that shears reaches farther.
 fn taut_span(leaf: &DiscreteLeaf) -> Option<RestObstacle> {
     let n = leaf.segments();
     let holders = |j: usize| {
@@ -449,7 +448,8 @@ fn obstacle_to_rest(
     }
     if let Some(part) = reached.borne_part {
         let loads = problem.leaf.keys_without_potential();
-        return Some(RestObstacle::EndOfGrowth { part, loads });
+        let spins = problem.leaf.scenario().vein_driven_to_spin();
+        return Some(RestObstacle::EndOfGrowth { part, loads, spins });
     }
     let bends = |j: usize| {
         let base = level.state.base(j);

@@ -75,6 +75,9 @@ const DESCENT: AcceleratedDescent = AcceleratedDescent {
 const RIGID_RODS_REFUSAL: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
      give a number, or use semi-implicit";
 
+const HELD_SPIN_REFUSAL: &str = "leaf.base_spin = \"held\": its motion does not hold the spin of bases on hinges; use \
+     semi-implicit, or shooting";
+
 const DEAD_MOMENT_REFUSAL: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
      need not come to rest; use semi-implicit, or shooting";
 
@@ -91,6 +94,9 @@ pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
     }
     if leaf.loads.has_moments() {
         return refuse(DEAD_MOMENT_REFUSAL);
+    }
+    if leaf.holds_spins() {
+        return refuse(HELD_SPIN_REFUSAL);
     }
     Ok(())
 }

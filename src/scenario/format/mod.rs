@@ -73,6 +73,8 @@ keys! {
     BaseHeld "leaf.base_held": TextPerRod, [0, 0, 0], Default("\"clamped\"");
     /// of elastic bases, the moment per angle by which a base has turned from its natural direction.
     BaseTurnStiffness "leaf.base_turn_stiffness": PerRod(Positive), [1, 1, 0], Derived;
+    /// of pinned bases: "free", a base may spin about its own tangent; or "held", its frame is turned from its natural one by the shortest turn of its tangent, as by a constant-velocity joint.
+    BaseSpin "leaf.base_spin": Text, [0, 0, 0], Default("\"free\"");
     /// A1, against torsion.
     Torsion "stiffness.torsion": Quantity(Positive), [2, 1, 0], Required("1.0");
     /// A2, against bending about d2: up and down, out of the leaf's surface.

@@ -36,6 +36,7 @@ fn rotation_about(axis: DVec3, rods: Range<usize>) -> ZeroEnergyRotation {
         axis,
         section_rate: -1.0,
         includes_bent_veins: true,
+        joints: Vec::new(),
     }
 }
 
@@ -110,6 +111,51 @@ fn untied_veins_turn_each_for_itself() {
     let aside = format!("{untied}; leaf.fan=[0.3, 0.0]");
     assert_eq!(turnings(&aside), each[1..]);
     assert_eq!(turnings(&format!("{aside}; leaf.joined=true")), []);
+}
+
+/// On hinges that hold the spin veins turn as on clamps, and round ones about the line of their loads.
+#[test]
+fn hinges_that_hold_the_spin_turn_as_clamps_do() {
+    let held = "leaf.base_held=pinned; leaf.base_spin=held";
+    assert_eq!(turnings_with("", held), turnings(""));
+    let across = turnings_with(
+        "",
+        &format!("{held}; coupling.x=2; load.gravity=[0, 0, -1]"),
+    );
+    let [whole] = &across[..] else {
+        panic!("{across:?}");
+    };
+    assert_eq!((whole.axis, whole.joints.len()), (-DVec3::Z, 2));
+    let strip = format!("{held}; stiffness.bending_3=[3.0, 1.0]");
+    assert_eq!(turnings_with("", &strip), []);
+    let untied = format!("{held}; coupling.x=0; coupling.y=0; coupling.z=0; leaf.fan=[0.3, 0.0]");
+    let found = turnings_with("", &untied);
+    let [aside, along] = &found[..] else {
+        panic!("{found:?}");
+    };
+    assert_eq!(*along, rotation_about(DVec3::X, 1..2));
+    let joint = aside.joints[0];
+    assert_eq!((aside.axis, aside.rods.clone()), (-DVec3::X, 0..1));
+    // What turns so stays on its joint, to any angle.
+    let base =
+        joint.settled(joint.natural * DQuat::from_euler(glam::EulerRot::XYZ, 0.2, 0.7, -0.4));
+    for angle in [0.3, 2.0] {
+        let [turn, back] = aside.rotations(angle, 0, base);
+        let turned = turn * base * back;
+        assert!(joint.settled(turned).angle_between(turned) < 1e-7);
+    }
+    let root = Pose {
+        position: DVec3::ZERO,
+        rotation: base,
+    };
+    let [spin, _] = aside.node_velocity(root, 0, base, 1.0);
+    let slope = |angle: f64| {
+        let [turn, back] = aside.rotations(angle, 0, base);
+        let turned = turn * base * back * base.conjugate();
+        turned.to_scaled_axis() / angle
+    };
+    assert!(spin.distance(0.5 * (slope(1e-4) + slope(-1e-4))) < 1e-6);
+    assert!(spin.dot(joint.axis(base)).abs() < 1e-14);
 }
 
 /// The turns of the two veins on hinges: as what, and about which axis.

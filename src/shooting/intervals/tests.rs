@@ -18,7 +18,8 @@ fn condensed(joined: bool, maps: Vec<Mat<f64>>) -> Option<CondensedEquations> {
     let scenario = scenario(joined);
     let equations = BoundaryValueProblem::new(&scenario);
     let units = PerturbationUnits::new(&equations, &LeafTrajectory::straight(&equations));
-    CondensedEquations::new(&equations, &units, maps, &[], Vec::new())
+    let base = equations.unstressed_base_state();
+    CondensedEquations::new(&equations, &units, &base, maps, &[], Vec::new())
 }
 
 /// Pseudo-random numbers in -1..1.

@@ -62,6 +62,7 @@ pub fn rows(key: Key) -> Vec<Row> {
             always("mixed", "leaf.base_held=['elastic','clamped','elastic']"),
         ]
         .concat(),
+        Key::BaseSpin => always("mixed", "leaf.base_spin=held"),
         Key::BaseTurnStiffness => [
             smooth("rooted", "leaf.base_turn_stiffness=1.9"),
             smooth("mixed", "leaf.base_turn_stiffness=1.9"),
