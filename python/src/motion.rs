@@ -3,8 +3,9 @@
 use std::error::Error;
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
+use leafdyn::run::Limit;
 use leafdyn::scenario;
 use leafdyn::simulate::{
     Frame, Options, OutputSample, Record, Refinement, Scheme, ShapeSnapshot, Simulation,
@@ -113,15 +114,27 @@ impl Motion {
     }
 
     /// Follows the leaf from time 0 to the end, or as far as it goes, on grids that are refined as
-    /// requested, and keeps all outputs of the last, whose number is returned. After Ctrl-C those are kept of
-    /// the last run that came to its end, or of the first as far as it came.
-    fn follow(&self, py: Python, progress: Option<&Bound<PyAny>>) -> PyResult<usize> {
+    /// requested, and keeps all outputs of the last, whose number is returned. After Ctrl-C, or so many
+    /// seconds, those are kept of the last run that came to its end, or of the first as far as it came.
+    #[pyo3(signature = (progress, time_limit))]
+    fn follow(
+        &self,
+        py: Python,
+        progress: Option<&Bound<PyAny>>,
+        time_limit: Option<f64>,
+    ) -> PyResult<usize> {
         let state = self.state.clone();
         let (scenario, mut options) = (self.scenario.clone(), self.options.clone());
         let duration = scenario.dynamics.duration;
+        let seconds = time_limit.and_then(|it| Duration::try_from_secs_f64(it).ok());
+        let deadline = seconds.and_then(|it| Instant::now().checked_add(it));
         let mut interrupt = Interrupt::default();
         let followed = run_keeping(py, progress, &mut interrupt, move |monitor| {
-            options.limit = monitor.limit();
+            options.limit = Limit {
+                deadline,
+                ..monitor.limit()
+            };
+            let late = || deadline.is_some_and(|time| Instant::now() >= time);
             let mut motion = Refinement::new(&scenario, &options)?;
             let clock = Instant::now();
             let mut watch = |simulation: &Simulation| {
@@ -130,7 +143,7 @@ impl Motion {
                     let run = format!("{segments} segments a rod, {}", elapsed(clock));
                     format!("t = {time:.4} of {duration}, {run}")
                 });
-                !monitor.cancelled()
+                !monitor.cancelled() && !late()
             };
             let mut runs = 0;
             while let Some(mut simulation) = motion.next_run(&mut watch) {
@@ -142,8 +155,8 @@ impl Motion {
                     }
                     watch(&simulation);
                 }
-                if monitor.cancelled() && (runs > 0 || frames.len() == 1) {
-                    // A run on a coarser grid is whole.
+                let whole_before = runs > 0 && (monitor.cancelled() || late());
+                if whole_before || monitor.cancelled() && frames.len() == 1 {
                     break;
                 }
                 runs += 1;

@@ -377,3 +377,14 @@ def test_the_program_is_there() -> None:
     command = Path(sys.executable).with_name("leafdyn")
     said = subprocess.run([command, "--version"], capture_output=True, text=True, check=True)
     assert said.stdout == f"leafdyn {leafdyn.__version__}\n"
+
+
+def test_motions_have_a_time_limit() -> None:
+    brief = {"dynamics.duration": 0.2}
+    unlimited = leafdyn.simulate(fan(2), set=brief)
+    limited = leafdyn.simulate(fan(2), set=brief, time_limit=1e6)
+    assert limited.outcome == "completed" and np.array_equal(limited.positions, unlimited.positions)
+    with pytest.raises(TimeoutError, match="time_limit = 1e-09: no run has an output by then"):
+        leafdyn.simulate(fan(2), set=brief, time_limit=1e-9)
+    with pytest.raises(ValueError, match="must be a positive number of seconds"):
+        leafdyn.simulate(fan(2), set=brief, time_limit=0.0)

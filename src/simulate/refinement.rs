@@ -241,6 +241,10 @@ impl Refinement {
         if matches!(stopped, Some(Stopped::Interrupted { .. })) {
             return;
         }
+        if stopped.is_some() && ended.steps() == 0 {
+            // Where no step from the start is short enough, none is on a finer grid.
+            return;
+        }
         if stopped.is_some() && self.completed {
             // The finer grid fails: what the coarser one found is the result.
             if let Some(before) = self.before {

@@ -264,3 +264,12 @@ fn bars_of_random_motions_cover_the_errors() {
         "{unknown}, {refused}"
     );
 }
+
+/// A leaf from whose start no step is short enough, with tissue that is nearly rigid, is not tried on finer grids.
+#[test]
+fn a_motion_without_a_step_is_not_refined() {
+    let saddle = scenario("study/saddle", "");
+    let found = followed(&saddle, &Options::default());
+    assert_eq!((found.runs, found.frames.len()), (1, 1));
+    assert!(!found.simulation.done());
+}

@@ -292,7 +292,7 @@ mod tests {
             ">bending stiffness A2<",
             ">by 1 % of 1 N cm²<",
             ">0, by 1 % of 1 N/cm<",
-            ">0, by 0.01 N/cm<",
+            ">0, by 0.01 N/cm²<",
             ">5<",
             ">\u{2212}2.5<",
             ">displacement of the tip / 10⁻³ cm<",

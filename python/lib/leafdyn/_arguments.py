@@ -41,6 +41,13 @@ def numbers(**given: float | None) -> None:
             raise ValueError(f"{name} = {found!r}: must be a number up to {sys.float_info.max:.1e}") from None
 
 
+def seconds(time_limit: float | None) -> None:
+    """Refuse what is no time limit."""
+    numbers(time_limit=time_limit)
+    if time_limit is not None and not time_limit > 0:
+        raise ValueError(f"time_limit = {time_limit}: must be a positive number of seconds")
+
+
 def switches(**given: bool) -> None:
     """Refuse what is neither true nor false."""
     for name, found in given.items():

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, Literal, SupportsIndex, overload
 
 from . import _leafdyn
-from ._arguments import numbers, switches, text, texts, whole
+from ._arguments import numbers, seconds, switches, text, texts, whole
 from ._errors import LeafWarning, keeping, unknown_key
 from ._leaf import Equilibrium
 from ._points import Points, point_table
@@ -44,9 +44,8 @@ def asked_for(
         "veins": _refined(veins),
     }
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
-    numbers(tolerance=tolerance, time_limit=time_limit)
-    if time_limit is not None and not time_limit > 0:
-        raise ValueError(f"time_limit = {time_limit}: must be a positive number of seconds")
+    numbers(tolerance=tolerance)
+    seconds(time_limit)
     switches(
         keep_unstable=keep_unstable,
         full_model=full_model,

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, SupportsIndex
 
 from . import _leafdyn
-from ._arguments import numbers, text, whole
+from ._arguments import numbers, seconds, text, whole
 from ._errors import keeping
 from ._motion import Frame, Motion, frame
 from ._progress import Progress, reporter
@@ -22,6 +22,7 @@ def simulate(
     segments: SupportsIndex | None = None,
     step: float | None = None,
     tolerance: float | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Motion:
     """Follow a leaf as it moves, and keep all outputs.
@@ -41,6 +42,9 @@ def simulate(
     tolerance
         The error of the tips that is aimed at, relative to the longest rod, 1e-3 if it is left out; of the semi-implicit
         method also the local error of a step on the first grid.
+    time_limit
+        Seconds after which no finer run begins and the one that is under way ends: then the motion is that of the last run
+        that came to its end, or of the first as far as it came, whose ``outcome`` is ``"interrupted"``.
 
     Returns
     -------
@@ -53,6 +57,8 @@ def simulate(
         If the scenario is refused.
     ValueError
         If the request cannot be met.
+    TimeoutError
+        If there is no output within the ``time_limit``.
 
     Warns
     -----
@@ -67,12 +73,15 @@ def simulate(
     ('completed', True)
     """
     leaf, core = _motion(scenario, set, method, segments, step, tolerance)
+    seconds(time_limit)
 
     def made(outputs: int) -> Motion | None:
         return Motion(core, leaf.name, leaf.joined) if outputs else None
 
     with reporter(progress) as heard, keeping(made):
-        core.follow(heard)
+        outputs = core.follow(heard, time_limit)
+    if not outputs:
+        raise TimeoutError(f"time_limit = {time_limit}: no run has an output by then: allow more, or set segments")
     found = Motion(core, leaf.name, leaf.joined)
     warn(found.name, found.remark, *found.doubts)
     return found

@@ -337,9 +337,41 @@ const SPELLING: SpellingLimits = SpellingLimits {
     longest_with_more_edits: 40,
 };
 
-/// The key or table that was probably meant by `path`: the same name in
+/// What the numbers of a table are called elsewhere, and here.
+const OTHER_NAMES: [(&str, &str); 15] = [
+    ("nu", "poisson"),
+    ("E", "young"),
+    ("G", "shear_modulus"),
+    ("rho", "mass_density"),
+    ("rho", "density"),
+    ("density", "mass_density"),
+    ("mass", "density"),
+    ("EI", "bending_2"),
+    ("GJ", "torsion"),
+    ("EA", "axial"),
+    ("radius", "diameter"),
+    ("height", "thickness"),
+    ("veins", "rods"),
+    ("angle", "elevation"),
+    ("angles", "fan"),
+];
+
+/// The key of the table of `path` that has another name elsewhere.
+fn key_by_another_name(path: &str) -> Option<&'static str> {
+    let (table, name) = path.rsplit_once('.')?;
+    let named = |(other, ours): &(&str, &str)| {
+        let key = Key::all().find(|key| key.path() == format!("{table}.{ours}"));
+        key.filter(|_| *other == name)
+    };
+    OTHER_NAMES.iter().find_map(named).map(Key::path)
+}
+
+/// The key or table that was probably meant by `path`: what has another name elsewhere, the same name in
 /// another table, or the nearest spelling.
 pub(super) fn nearest_key(path: &str) -> Option<&'static str> {
+    if let Some(meant) = key_by_another_name(path) {
+        return Some(meant);
+    }
     let name = path.rsplit('.').next().unwrap_or(path);
     // `units.mass` does not mean `load.point.mass`.
     let of_numbers = |key: &Key| key.table_path().name == name && !path.starts_with("units.");

@@ -176,8 +176,11 @@ pub(super) fn shoot_from_relaxed_leaf(
     let found = run_timed(|| {
         let rest = MethodSolution::from_relaxation(scenario, &options)?;
         let precision = shooting::RequiredPrecision::EstimatedError(accuracy);
-        let asked =
-            shooting::ShootingOptions::new(rest.shooting_start(), &rest.stations, precision);
+        let asked = shooting::ShootingOptions {
+            // Between veins that tissue ties shooting may take hours.
+            gives_up: scenario.tissue.is_some(),
+            ..shooting::ShootingOptions::new(rest.shooting_start(), &rest.stations, precision)
+        };
         let shot = rest
             .is_at_rest()
             .then(|| shooting::solve(scenario, &asked, &mut |_| {}));

@@ -62,7 +62,10 @@ pub fn find_reference(
         .as_ref()
         .map_or(ShootingStart::Arcs, MethodSolution::shooting_start);
     let precision = shooting::RequiredPrecision::EstimatedError(SMALLEST_TOLERANCE);
-    let options = shooting::ShootingOptions::new(start, &stations, precision);
+    let options = shooting::ShootingOptions {
+        gives_up: relaxed.is_some(),
+        ..shooting::ShootingOptions::new(start, &stations, precision)
+    };
     let solved = shooting::solve(scenario, &options, &mut |_| {});
     let neutral = match &solved {
         Ok(solution) => solution.neutral.as_ref().map(ToString::to_string),

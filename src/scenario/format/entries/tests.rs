@@ -83,6 +83,12 @@ fn slips_are_explained() {
         stiffness.torsion[1]=-1 => set stiffness.torsion[1]=-1: stiffness.torsion, entry 2 = -1: must be greater than 0
         stiffness.bending2[1]=1 => unknown key stiffness.bending2 (did you mean stiffness.bending_2?)
         scale:torsion=1 => did you mean stiffness.torsion?
+        section.nu=0.3 => unknown key section.nu (did you mean section.poisson?)
+        section.E=1e9 => did you mean section.young?
+        section.density=900 => did you mean section.mass_density?
+        blade.E=1e9 => did you mean blade.young?
+        stiffness.EI=1 => did you mean stiffness.bending_2?
+        dynamics.mass=1 => did you mean dynamics.density?
         stiffness.gold=1 => unknown key stiffness.gold: [stiffness] has torsion, bending_2
         monsoon=1 => unknown key monsoon: keys are name and those of units, leaf,
         load.gravity[2] => must be KEY=VALUE
