@@ -1,5 +1,7 @@
-//! A progress line on standard error for long runs.
+//! A progress line on standard error for long runs; off a terminal, where a line cannot be replaced, notes that
+//! become rarer.
 
+use crate::verbs::exit::print_note;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use leafdyn::relax::{CorrectionProgress, Progress};
 use std::io;
@@ -8,6 +10,9 @@ use std::time::{Duration, Instant};
 
 /// Runs that take less time show no progress line, which would only flicker.
 const LONG_RUN: Duration = Duration::from_millis(500);
+
+/// Off a terminal a first note is printed after this time, and others whenever it has doubled.
+const FIRST_NOTE: Duration = Duration::from_secs(10);
 
 /// Most redraws of the line per second.
 const REDRAWS_PER_SECOND: u8 = 10;
@@ -20,6 +25,8 @@ pub struct ProgressLine {
     scenario: String,
     start: Instant,
     shown: bool,
+    on_terminal: bool,
+    next_note: Duration,
     bar: Option<ProgressBar>,
     grids: GridProgress,
     shooting: Option<ShootingProgress>,
@@ -32,7 +39,9 @@ impl ProgressLine {
         ProgressLine {
             scenario: scenario.into(),
             start: Instant::now(),
-            shown: shown && io::stderr().is_terminal(),
+            shown,
+            on_terminal: io::stderr().is_terminal(),
+            next_note: FIRST_NOTE,
             bar: None,
             grids: GridProgress::default(),
             shooting: None,
@@ -72,7 +81,19 @@ impl ProgressLine {
     /// known, the remaining time.
     pub fn update(&mut self, fraction: Option<f64>, message: impl FnOnce() -> String) {
         let elapsed = self.start.elapsed();
-        if !self.shown || elapsed < LONG_RUN {
+        let first = if self.on_terminal {
+            LONG_RUN
+        } else {
+            self.next_note
+        };
+        if !self.shown || elapsed < first {
+            return;
+        }
+        let left = remaining_time_text(elapsed.saturating_sub(self.phase_start), fraction);
+        let message = format!("{}, {:.0} s{left}", message(), elapsed.as_secs_f64());
+        if !self.on_terminal {
+            self.next_note = 2 * elapsed;
+            print_note(&format!("{}: {message}", self.scenario));
             return;
         }
         let bar = self.bar.get_or_insert_with(|| {
@@ -82,9 +103,7 @@ impl ProgressLine {
                 .with_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()))
                 .with_prefix(self.scenario.clone())
         });
-        let left = remaining_time_text(elapsed.saturating_sub(self.phase_start), fraction);
-        let (message, elapsed) = (message(), elapsed.as_secs_f64());
-        bar.set_message(format!("{message}, {elapsed:.0} s{left}"));
+        bar.set_message(message);
     }
 
     /// Begins another phase: fractions refer to it from now on.
