@@ -32,8 +32,9 @@ use crate::relax::Parameter;
 use crate::scenario;
 use crate::scenario::units::{DIMENSIONLESS, Dimension, TIME};
 use crate::scenario::{
-    BaseSpin, BaseSupport, Entries, EntryPath, Key, Scenario, ScenarioError, intended_number,
+    BaseSpin, BaseSupport, Entries, EntryPath, Key, Scenario, ScenarioError, Wind, intended_number,
 };
+use glam::DVec3;
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::RangeInclusive;
@@ -206,8 +207,14 @@ impl ParameterKeys {
 
     /// The reference magnitude of the number if it is zero, in a scenario's units.
     pub(crate) fn reference_magnitude(&self, scenario: &Scenario) -> f64 {
+        // The drag of a velocity is |v| v: small is what is small beside its size.
+        let speed = |wind: &Wind| DVec3::from_array(wind.velocity.at(0.0)).length();
         let unit = |target: &VariableTarget| match target {
             VariableTarget::Entry(part) if part.scale => 1.0,
+            VariableTarget::Entry(part) if part.key == Key::WindVelocity => {
+                let known = scenario.wind.as_ref().map(speed).filter(|it| *it > 0.0);
+                known.unwrap_or(AIR_AT_REST * scenario.unit(part.key))
+            }
             VariableTarget::Entry(part) => scenario.unit(part.key),
             VariableTarget::Knob(_) => 0.0,
         };
@@ -659,6 +666,9 @@ impl BaseScenario {
         Some(changed.to_toml())
     }
 }
+
+/// Steps of a velocity of air at rest, over those of other numbers.
+const AIR_AT_REST: f64 = 1e-9;
 
 /// Whether forces on a leaf depend on numbers of its scenario otherwise than these say: by the stress-free leaf, by the
 /// turn of an elastic base from its natural direction, by the frame that a hinge allows, or by the square of the air's velocity.

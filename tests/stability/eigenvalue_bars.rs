@@ -88,9 +88,26 @@ fn bars_of_a_blade_end_before_rounding_does() {
         listed(&settled(&blade, &options))
     });
     for ((value, bar), (other, other_bar)) in fine.into_iter().zip(rough) {
-        assert!(bar < 1e-5 * value, "{value} within {bar}");
+        assert!(bar < 1e-4 * value, "{value} within {bar}");
         let apart = (value - other).abs();
         assert!(apart <= bar + other_bar, "{value} within {bar}: {apart:e}");
+    }
+}
+
+/// Eigenvalues of blades whose lengths hardly differ scatter by what is out of balance in them: within the bars.
+#[test]
+fn bars_of_blades_cover_what_is_out_of_balance() {
+    let found = [25.0, 25.000_000_01, 24.999_999_95].map(|length| {
+        let blade = scenario("measured/blade", &format!("blade.length={length:?}"));
+        let mut options = with_modes(3, to(1e-6));
+        options.mode_shapes = true;
+        listed(&settled(&blade, &options))
+    });
+    for (one, other) in [(0, 1), (0, 2), (1, 2)] {
+        for ((value, bar), (again, its_bar)) in found[one].iter().zip(&found[other]) {
+            let apart = (value - again).abs();
+            assert!(apart <= bar + its_bar, "{value} within {bar:e}: {apart:e}");
+        }
     }
 }
 

@@ -155,3 +155,22 @@ fn a_moment_that_turns_bends_a_rod_to_a_circle() {
         }
     }
 }
+
+/// The drag of a velocity v is |v| v: at rest its derivative is zero, and in a weak wind that across it is |v|, however
+/// weak.
+#[test]
+fn velocities_of_air_at_rest_and_of_a_weak_wind() {
+    let across = |velocity: &str| {
+        let veins = VEINS.replace("HELD", "\"clamped\"");
+        let base = base(
+            &format!("{veins}{WIND}"),
+            &format!("wind.velocity={velocity}"),
+        );
+        let options = iterated(1e-11, 12);
+        let (_, found) = crate::sensitivities::derivatives(&base, &["wind.velocity[0]"], &options);
+        found[0].tips[0].length()
+    };
+    assert!(across("[0.0, 0.0, 0.0]") < 1e-9);
+    let [weak, weaker] = ["[0.0, 1e-3, 1e-3]", "[0.0, 1e-4, 1e-4]"].map(across);
+    assert!((weak / weaker - 10.0).abs() < 1e-3, "{weak} {weaker}");
+}

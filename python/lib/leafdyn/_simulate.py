@@ -44,7 +44,8 @@ def simulate(
         method also the local error of a step on the first grid.
     time_limit
         Seconds after which no finer run begins and the one that is under way ends: then the motion is that of the last run
-        that came to its end, or of the first as far as it came, whose ``outcome`` is ``"interrupted"``.
+        that came to its end, or of the first as far as it came, whose ``outcome`` is ``"interrupted"``. A run on half as
+        many segments, with which the first is compared, comes before it and keeps nothing.
 
     Returns
     -------
@@ -81,7 +82,7 @@ def simulate(
     with reporter(progress) as heard, keeping(made):
         outputs = core.follow(heard, time_limit)
     if not outputs:
-        raise TimeoutError(f"time_limit = {time_limit}: no run has an output by then: allow more, or set segments")
+        raise TimeoutError(f"time_limit = {time_limit}: no run has an output by then: allow more, or ask for fewer segments")
     found = Motion(core, leaf.name, leaf.joined)
     warn(found.name, found.remark, *found.doubts)
     return found
