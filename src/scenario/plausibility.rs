@@ -99,7 +99,7 @@ remarks! {
         } = "nearly-upright",
         /// Rotary inertia that is not given, of veins with a mass.
         #[error(
-            "dynamics.density is given without a rotary inertia: frequencies and motions are those of veins with sections {} in radius, a fifth of the length; dynamics.section_radius gives the radius that they have",
+            "dynamics.density is given without a rotary inertia: frequencies and motions are those of veins with sections {} in radius, a fifth of the length; dynamics.section_radius gives the radius of round ones, dynamics.rotary_inertia that of others",
             four_digits(*.radius)
         )]
         AssumedRotaryInertia {
