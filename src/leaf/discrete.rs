@@ -10,10 +10,9 @@
 //! which differ from those at its middle by a series in ds^2.
 
 use crate::leaf::direct::pattern::SharedPattern;
-use crate::leaf::held_spin::BaseJoint;
 use crate::leaf::nodal_loads::{Lever, NodalMoment, ScheduledLoads};
 use crate::leaf::springs::NodeSprings;
-use crate::leaf::state::State;
+use crate::leaf::state::{BaseJoint, State};
 use crate::leaf::{FollowerLoad, GrippedNode, Leaf, Loads};
 use crate::natural::Natural;
 use crate::numbers::largest;

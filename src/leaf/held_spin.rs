@@ -1,65 +1,21 @@
-//! Hinges that hold the spin of a base ([`HeldSpin`]): the increments that they allow, their moments, and
+//! Hinges that hold the spin of a base ([`HeldSpin`](crate::rotation::HeldSpin)): the increments that they allow, their moments, and
 //! Newton's equations across what they hold.
 //!
 //! With the unit vector a of the joint, P = 1 - a a^T, the spatial gradient g of the energy by the rotation of the base
 //! and its symmetric second derivatives H, the equations of the base are P H P delta = -P g, and the moment of the joint
 //! is (a . g) a. As the turns that a joint allows are a great sphere, no derivative of a is in them.
 
-use crate::leaf::Leaf;
 use crate::leaf::block_tridiagonal::rod_lane;
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{NodalField, SpinAxes, SpinAxis, State};
 use crate::leaf::system::System;
 use crate::rod::{NodeBlock, UNKNOWNS};
-use crate::rotation::{HeldSpin, outer};
-use glam::{DMat3, DQuat, DVec3};
+use crate::rotation::outer;
+use glam::{DMat3, DVec3};
 
 /// The entry of the matrix along a, in A/L: with the mass of a base it is a frequency above all others, and its
 /// rounding, in what lies across a, is far below the stiffness of any vein.
 const HELD_SPIN_STIFFNESS: f64 = 1e6;
-
-/// A base whose spin is held.
-#[derive(Clone, Copy, Debug)]
-pub struct BaseJoint {
-    pub rod: usize,
-    pub spin: HeldSpin,
-}
-
-impl Leaf {
-    /// Whether the base of rod `j` turns on a hinge that holds its spin.
-    pub fn holds_base_spin(&self, j: usize) -> bool {
-        self.scenario().holds_base_spin(j)
-    }
-
-    /// Whether hinges hold the spin of some base.
-    pub fn holds_spins(&self) -> bool {
-        (0..self.rods()).any(|j| self.holds_base_spin(j))
-    }
-
-    /// The joint at the base of rod `j`, if its spin is held.
-    pub fn base_joint(&self, j: usize) -> Option<HeldSpin> {
-        self.holds_base_spin(j).then(|| HeldSpin {
-            natural: self.base_pose(j).rotation,
-        })
-    }
-
-    /// All bases whose spin is held.
-    pub(super) fn base_joints(&self) -> Vec<BaseJoint> {
-        let joint = |rod: usize| {
-            let spin = self.base_joint(rod)?;
-            Some(BaseJoint { rod, spin })
-        };
-        (0..self.rods()).filter_map(joint).collect()
-    }
-
-    /// What a base of rod `j` with the rotation `q` exerts on its joint of this `moment` on it; nothing without one.
-    pub fn joint_moment(&self, j: usize, q: DQuat, moment: DVec3) -> DVec3 {
-        self.base_joint(j).map_or(DVec3::ZERO, |joint| {
-            let axis = joint.axis(q);
-            moment.dot(axis) * axis
-        })
-    }
-}
 
 impl DiscreteLeaf {
     /// Whether hinges hold the spin of some base.
@@ -237,7 +193,7 @@ impl SpinAxes {
 mod tests {
     use super::*;
     use crate::leaf::state::dot;
-    use crate::leaf::{DirectSolver, Grid};
+    use crate::leaf::{DirectSolver, Grid, Leaf};
     use crate::scenario::Scenario;
 
     const LEAF: &str = r#"

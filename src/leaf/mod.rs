@@ -48,6 +48,7 @@ pub use crate::leaf::nodal_loads::{FollowerLoad, Lever, NodalMoment};
 pub use crate::leaf::rod_ode::{FieldChange, RodFields, RodIntegrator, StationFields};
 pub use crate::leaf::solve::{DefiniteFactors, LinearSolveOutcome};
 pub use crate::leaf::springs::SpringEnd;
+use crate::leaf::state::BaseJoint;
 pub use crate::leaf::state::{
     Increment, NodalField, State, add_to_increment, displacement_part, dot, rotation_part,
 };
@@ -59,7 +60,7 @@ pub use crate::leaf::tissue::cells::{CellStiffness, ContractionResultants};
 pub use crate::leaf::tissue::rigid::ForceCarriers;
 pub use crate::leaf::tissue::strips::HalfTurn;
 use crate::rod::Section;
-use crate::rotation::{self, Pose};
+use crate::rotation::{self, HeldSpin, Pose};
 pub use crate::scenario::Scale;
 use crate::scenario::{
     BaseSupport, Clamp, Dynamics, Profile, Rod, RodPlace, Scenario, Tissue, ZeroEnergyRotation,
@@ -582,5 +583,41 @@ impl Leaf {
 
     fn rod(&self, j: usize) -> &Rod {
         &self.scenario.rods[j]
+    }
+}
+
+impl Leaf {
+    /// Whether the base of rod `j` turns on a hinge that holds its spin.
+    pub fn holds_base_spin(&self, j: usize) -> bool {
+        self.scenario().holds_base_spin(j)
+    }
+
+    /// Whether hinges hold the spin of some base.
+    pub fn holds_spins(&self) -> bool {
+        (0..self.rods()).any(|j| self.holds_base_spin(j))
+    }
+
+    /// The joint at the base of rod `j`, if its spin is held.
+    pub fn base_joint(&self, j: usize) -> Option<HeldSpin> {
+        self.holds_base_spin(j).then(|| HeldSpin {
+            natural: self.base_pose(j).rotation,
+        })
+    }
+
+    /// All bases whose spin is held.
+    fn base_joints(&self) -> Vec<BaseJoint> {
+        let joint = |rod: usize| {
+            let spin = self.base_joint(rod)?;
+            Some(BaseJoint { rod, spin })
+        };
+        (0..self.rods()).filter_map(joint).collect()
+    }
+
+    /// What a base of rod `j` with the rotation `q` exerts on its joint of this `moment` on it; nothing without one.
+    pub fn joint_moment(&self, j: usize, q: DQuat, moment: DVec3) -> DVec3 {
+        self.base_joint(j).map_or(DVec3::ZERO, |joint| {
+            let axis = joint.axis(q);
+            moment.dot(axis) * axis
+        })
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::numbers::{larger, largest};
 use crate::rod::NodePair;
-use crate::rotation;
+use crate::rotation::{self, HeldSpin};
 use glam::{DQuat, DVec3};
 use std::ops::{BitAnd, BitOr};
 
@@ -194,6 +194,13 @@ impl State {
         self.q[k] = (rotation::exp(step * rotation_part(increment)) * self.q[k]).normalize();
         self.x[k] += step * displacement_part(increment);
     }
+}
+
+/// A base whose spin is held.
+#[derive(Clone, Copy, Debug)]
+pub struct BaseJoint {
+    pub rod: usize,
+    pub spin: HeldSpin,
 }
 
 /// The unit vector about which a hinge does not let the base of a rod turn, as it holds its spin.

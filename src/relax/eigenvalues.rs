@@ -278,14 +278,18 @@ impl<'a> NestedEigenvalues<'a> {
         level: Cow<'a, GridLevel>,
         on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
     ) -> bool {
-        let coarser = self.finest.as_ref();
-        let near = coarser.map_or(Vec::new(), |coarser| coarser.interpolated(&level.leaf));
-        let Some(pairs) = on(&level, &near) else {
+        let Some(pairs) = on(&level, &self.interpolated(&level.leaf)) else {
             return false;
         };
         self.extend_series(&level, &pairs);
         self.replace_finest(level, pairs);
         true
+    }
+
+    /// The shapes of the finest grid, on another one.
+    fn interpolated(&self, leaf: &DiscreteLeaf) -> Vec<Vec<Increment>> {
+        let finest = self.finest.as_ref();
+        finest.map_or(Vec::new(), |finest| finest.interpolated(leaf))
     }
 
     /// Adds the eigenvalues on a grid to the series, and what limits their accuracy there.
@@ -311,9 +315,7 @@ impl<'a> NestedEigenvalues<'a> {
         level: GridLevel,
         on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
     ) -> bool {
-        let coarser = self.finest.as_ref();
-        let near = coarser.map_or(Vec::new(), |coarser| coarser.interpolated(&level.leaf));
-        let Some(pairs) = on(&level, &near) else {
+        let Some(pairs) = on(&level, &self.interpolated(&level.leaf)) else {
             return false;
         };
         let before = self.series.clone();
