@@ -1,7 +1,7 @@
 //! Hinges that hold the spin of bases (`leaf.base_spin = "held"`), as constant-velocity joints: against closed forms,
 //! shooting, clamps, and differences.
 
-use crate::sensitivities::{derivatives, differenced, keys, of, results};
+use crate::sensitivities::assert_those_of_relaxations;
 use glam::{DQuat, DVec3};
 use leafdyn_testing::*;
 use std::f64::consts::PI;
@@ -231,24 +231,7 @@ fn derivatives_are_those_of_whole_relaxations() {
                 "rest.twist",
                 "stiffness.torsion",
             ];
-            let options = with_modes(2, iterated(1e-10, 12));
-            let (leaf, ours) = derivatives(&base, &wanted, &options);
-            let (units, count) = results(&leaf);
-            for (key, ours) in keys(&wanted).iter().zip(&ours) {
-                let theirs = differenced(&base, key, &options);
-                let size = base.differentiable_value(key).unwrap().abs().max(1e-1);
-                let ours = of(ours);
-                assert_eq!(ours.len(), theirs.len());
-                for (k, (ours, (theirs, unsure))) in ours.iter().zip(&theirs).enumerate() {
-                    let off = (ours - theirs).abs() - 4.0 * unsure;
-                    let error = off * size / (units[k].abs().max(1.0) + theirs.abs() * size);
-                    let allowed = if k < count { 1e-7 } else { 1e-6 };
-                    assert!(
-                        error < allowed,
-                        "{held} {entries} {key} {k}: {ours} {theirs}"
-                    );
-                }
-            }
+            assert_those_of_relaxations(&base, &wanted, &format!("{held} {entries}"));
         }
     }
 }

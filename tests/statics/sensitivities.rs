@@ -369,6 +369,25 @@ pub fn of(found: &Sensitivity) -> Vec<f64> {
         .collect()
 }
 
+/// Asserts that the derivatives by these keys, with those of two frequencies, are those of whole relaxations.
+pub fn assert_those_of_relaxations(base: &BaseScenario, wanted: &[&str], what: &str) {
+    let options = with_modes(2, iterated(1e-10, 12));
+    let (leaf, ours) = derivatives(base, wanted, &options);
+    let (units, count) = results(&leaf);
+    for (key, ours) in keys(wanted).iter().zip(&ours) {
+        let theirs = differenced(base, key, &options);
+        let size = base.differentiable_value(key).unwrap().abs().max(1e-1);
+        let ours = of(ours);
+        assert_eq!(ours.len(), theirs.len());
+        for (k, (ours, (theirs, unsure))) in ours.iter().zip(&theirs).enumerate() {
+            let off = (ours - theirs).abs() - 4.0 * unsure;
+            let error = off * size / (units[k].abs().max(1.0) + theirs.abs() * size);
+            let allowed = if k < count { 1e-7 } else { 1e-6 };
+            assert!(error < allowed, "{what} {key} {k}: {ours} {theirs}");
+        }
+    }
+}
+
 /// Every key, on one grid, which leaves no doubt about what is differenced.
 #[test]
 fn they_are_those_of_whole_relaxations() {
