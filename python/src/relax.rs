@@ -58,6 +58,8 @@ pub struct Asked {
     points: Option<Points>,
     /// Seconds after which all leaves are given up.
     time_limit: Option<f64>,
+    /// Seconds after which a leaf of several is given up.
+    time_limit_each: Option<f64>,
 }
 
 /// The outcome of one of several scenarios: a leaf, or why it is refused.
@@ -129,17 +131,19 @@ impl Asked {
         })
     }
 
-    /// The limit of the time that begins now; none beyond what a clock counts.
+    /// The limit of the time that begins now.
     fn limit(&self) -> Limit {
-        let limit = self
-            .time_limit
-            .and_then(|it| Duration::try_from_secs_f64(it).ok());
-        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
         Limit {
-            deadline,
+            deadline: deadline(self.time_limit),
             ..Limit::default()
         }
     }
+}
+
+/// When these seconds, which begin now, are over; never, beyond what a clock counts.
+fn deadline(seconds: Option<f64>) -> Option<Instant> {
+    let time = Duration::try_from_secs_f64(seconds?).ok()?;
+    Instant::now().checked_add(time)
 }
 
 /// Reports every step of a relaxation to a monitor, counted over all grids.
@@ -287,11 +291,16 @@ pub fn relax_one(
         })?;
         interrupt.or_else(found, value_error)?
     } else {
-        let keys: Result<Vec<ParameterKeys>, _> = (asked.sensitivity.iter())
-            .map(|key| ParameterKeys::parse_with_vectors(key))
-            .collect();
-        let keys = keys.map_err(|error| vary_error(py, error))?;
         let base = scenario.base(py)?;
+        let keys = match &asked.sensitivity[..] {
+            [every] if every == "all" => base.differentiable_numbers(),
+            keys => {
+                let keys: Result<Vec<ParameterKeys>, _> = (keys.iter())
+                    .map(|key| ParameterKeys::parse_with_lists(key))
+                    .collect();
+                keys.map_err(|error| vary_error(py, error))?
+            }
+        };
         let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
             monitor.watch(&mut options.limit);
             let name = base.scenario().name.clone();
@@ -337,6 +346,7 @@ pub fn relax_many(
         estimate.then(|| scenario.base(py)).transpose()
     };
     let bases = scenarios.iter().map(base).collect::<PyResult<Vec<_>>>()?;
+    let each = asked.time_limit_each;
     let finished: Arc<Vec<Mutex<Option<LeafOrWhy>>>> =
         Arc::new(checked.iter().map(|_| Mutex::default()).collect());
     let places = finished.clone();
@@ -344,6 +354,9 @@ pub fn relax_many(
         monitor.watch(&mut options.limit);
         let (done, all, clock) = (AtomicUsize::new(0), checked.len(), Instant::now());
         let one = |(number, scenario): (usize, &Arc<scenario::Scenario>)| {
+            let mut options = options.clone();
+            let own = deadline(each);
+            options.limit.deadline = options.limit.deadline.into_iter().chain(own).min();
             let mut found = relax::relax(scenario, &options, &mut |_| {});
             if let (Ok(leaf), Some(base)) = (&mut found, &bases[number]) {
                 study::estimate_error_in_veins(base, leaf, &options);

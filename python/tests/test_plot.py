@@ -50,6 +50,12 @@ def test_a_motion_shows_what_varies_most() -> None:
     duration = {"dynamics.duration": 0.2}
     motion = leafdyn.simulate(fan(2), set=duration)
     assert motion.plot().get_ylabel() == f"tip {'xyz'[np.ptp(motion.tips, axis=0)[0].argmax()]}"
+    (band,) = motion.plot().collections
+    known = np.isfinite(motion.errors)
+    heights = motion.tips[known, 0, np.ptp(motion.tips, axis=0)[0].argmax()]
+    edges = band.get_paths()[0].vertices[:, 1]
+    assert known.any()
+    assert edges.max() == pytest.approx((heights + motion.errors[known]).max(), abs=1e-15)
     ax = leafdyn.simulate({**fan(2), **HELD}, set=duration).plot()
     assert ax.get_ylabel().startswith("middle ")
     assert len(ax.lines) == 2

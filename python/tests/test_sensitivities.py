@@ -130,6 +130,34 @@ def test_they_are_a_table(tmp_path: Path) -> None:
         leaf.figure("sensitivities")
 
 
+def test_their_table_has_units() -> None:
+    pytest.importorskip("pandas")
+    units = {"length": "cm", "force": "N", "time": "s"}
+    leaf = leafdyn.sensitivities({**fan(2), "units": units}, ["load.gravity[2]"])
+    attrs = leaf.sensitivities.to_pandas().attrs
+    assert attrs["scenario"] == "fan"
+    assert attrs["key_units"] == {"load.gravity[2]": "N cm^-1"}
+    assert attrs["units"] | {"tip_z": "cm", "tip_z_error": "cm", "energy": "N cm"} == attrs["units"]
+
+
+def test_a_figure_shows_what_matters_most() -> None:
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("agg")
+    keys = ["stiffness.axial", "stiffness.bending_2", "load.gravity[2]", "load.gravity[1]"]
+    leaf = leafdyn.sensitivities({**fan(2), "units": {"length": "cm"}}, keys)
+    ax = leaf.sensitivities.plot()
+    assert ax.get_xlabel() == "change of tip_z by 1 % of each / cm"
+    # Nothing is 1 % of zero.
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    lengths = [bar.get_width() for bar in ax.patches]
+    assert sorted(names) == sorted(keys[:3])
+    assert sorted(lengths, key=abs) == lengths
+    assert lengths == [0.01 * leaf.sensitivities[key].value * leaf.sensitivities[key].tips[0, 2] for key in names]
+    assert leaf.sensitivities.plot("energy").get_xlabel() == "change of energy by 1 % of each"
+    with pytest.raises(ValueError, match="column = 'value': must be one of tip_x, tip_y, tip_z, energy"):
+        leaf.sensitivities.plot("value")
+
+
 def test_refusals() -> None:
     with pytest.raises(ValueError, match="stiffness.nonsense"):
         leafdyn.sensitivities(fan(2), "stiffness.nonsense")

@@ -10,6 +10,7 @@ import pytest
 from leaves import column, fan
 
 import leafdyn
+from leafdyn import _sweep
 
 pandas = pytest.importorskip("pandas")
 
@@ -208,6 +209,21 @@ def test_rows_are_leaves() -> None:
         leafdyn.sweep(fan(2), pandas.DataFrame({3: [1.0]}))
 
 
+def test_rows_that_are_given_otherwise_say_how() -> None:
+    """A cell that is missing, a column that is no key, values of their own for keys that are joined."""
+    missing = r"^row 1: .*the cell is missing: fill it, or leave leaf.length out of this row in a list of dicts$"
+    for cells in ([1.0, np.nan], pandas.array([1.0, None], dtype="Float64")):
+        with pytest.raises(leafdyn.ScenarioError, match=missing):
+            leafdyn.sweep(fan(2), pandas.DataFrame({"leaf.length": cells}))
+    named = pandas.DataFrame({"specimen": ["a", "b"], "leaf.length": [1.0, 1.1]})
+    with pytest.raises(leafdyn.ScenarioError, match="unknown key specimen.*what is no key belongs into the index: set_index$"):
+        leafdyn.sweep(fan(2), named)
+    assert leafdyn.sweep(fan(2), named.set_index("specimen"), "tip_z").index.tolist() == ["a", "b"]
+    apart = {("stiffness.bending_1", "stiffness.bending_2"): [(1.0, 2.0, 1.0), (2.0, 1.0)]}
+    with pytest.raises(leafdyn.ScenarioError, match="values of their own are columns of a DataFrame, a row for each leaf$"):
+        leafdyn.sweep(fan(3), apart, on_error="raise")
+
+
 def test_refusals_are_told() -> None:
     """The remark has a column where some leaf is not at rest; a key that all leaves do not know is no row."""
     assert "remark" not in leafdyn.sweep(fan(2), {"stiffness.torsion": [1.0]})
@@ -259,6 +275,33 @@ def test_what_ran_out_of_time_is_missing() -> None:
     with pytest.warns(leafdyn.LeafWarning):
         table = leafdyn.sweep(fan(5), lengths, {"top": lambda leaf: leaf.tip[2]}, time_limit=1e-9)
     assert table["top"].isna().all()
+
+
+def test_each_leaf_has_a_limit_of_time() -> None:
+    assert [leaf.success for leaf in leafdyn.relax_many([fan(3), fan(2)], time_limit_each=1e9)] == [True, True]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", leafdyn.LeafWarning)
+        both = leafdyn.relax_many([fan(3), fan(2)], time_limit=1e9, time_limit_each=1e-9)
+        table = leafdyn.sweep(fan(3), {"leaf.length": [1.0, 1.1]}, "outcome", time_limit_each=1e-9)
+    assert [leaf.outcome for leaf in both] == ["out-of-time"] * 2
+    assert table["outcome"].tolist() == ["out-of-time"] * 2
+    with pytest.raises(ValueError, match="time_limit_each = -1"):
+        leafdyn.sweep(fan(3), {"leaf.length": [1.0]}, time_limit_each=-1)
+
+
+def test_the_limit_of_all_leaves_counts_over_what_is_kept_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leaves are handed over in parts: the later ones have what the earlier ones leave of the time."""
+    limits: list[float] = []
+    solve = _sweep.relaxed
+
+    def relaxed(leaves: Any, asked: dict[str, Any], *rest: Any) -> Any:
+        limits.append(asked["time_limit"])
+        return solve(leaves, asked, *rest)
+
+    monkeypatch.setattr(_sweep, "relaxed", relaxed)
+    monkeypatch.setattr(_sweep, "AT_ONCE", 1)
+    leafdyn.sweep(fan(2), {"leaf.length": [1.0, 1.1, 1.2]}, time_limit=1e6)
+    assert 1e6 >= limits[0] > limits[1] > limits[2] > 0.0
 
 
 def test_leaves_that_do_not_come_to_rest_are_counted() -> None:
@@ -343,3 +386,7 @@ def test_a_limit_of_time() -> None:
         assert [leaf.outcome, *(it.outcome for it in many)] == [wanted] * 3
     with pytest.raises(ValueError, match="time_limit = 0"):
         leafdyn.relax(fan(2), time_limit=0)
+    with pytest.raises(ValueError, match="time_limit = 0"):
+        leafdyn.modes(fan(2), time_limit=0)
+    with pytest.warns(leafdyn.LeafWarning, match="the time allowed was over"):
+        assert leafdyn.sensitivities(fan(2), "leaf.length", time_limit=1e-9).outcome == "out-of-time"

@@ -367,6 +367,15 @@ remarks! {
             /// As many as are told.
             found: usize,
         } = "fewer-motions",
+        /// Modes that the end of the time allowed left out, or made less accurate.
+        #[error(
+            "the time allowed was over before the lowest modes {}: allow more",
+            if *.told { "were as accurate as they would be" } else { "were known" }
+        )]
+        ModesOutOfTime {
+            /// Whether modes are told.
+            told: bool,
+        } = "modes-out-of-time",
         /// A given shape from which the leaf did not come to rest.
         #[error("from the given start the leaf does not come to rest: it was relaxed as without one")]
         RelaxedAnew = "relaxed-anew",

@@ -302,6 +302,14 @@ pub(super) fn equilibrium_with_stability(
         (stopped.is_none()).then(|| eigenvalues::lowest(problem, &found, list))?
     });
     leaf.stability.modes = modes.map(|it| it.modes);
+    // What cancels a run, rather than its time, needs no word.
+    let late = (problem.options.limit.deadline).is_some_and(|deadline| Instant::now() >= deadline);
+    let asked_for_modes = requested > 0 && problem.leaf.has_potential();
+    if late && asked_for_modes && leaf.outcome.is_at_rest() {
+        leaf.doubts.push(EquilibriumDoubt::ModesOutOfTime {
+            told: leaf.stability.modes.is_some(),
+        });
+    }
     if leaf.outcome.is_at_rest() && !problem.leaf.has_potential() {
         leaf.stability.small_motions = small_motions(problem, &found);
         leaf.tell_small_motions();

@@ -192,13 +192,13 @@ impl ParameterKeys {
         &self.0
     }
 
-    /// Keys as they are written, of which that of a vector stands for all of its components.
+    /// Keys as they are written, of which that of a vector or a list stands for all of its entries.
     ///
     /// # Errors
     /// As those of [`ParameterKeys::from_str`].
-    pub fn parse_with_vectors(text: &str) -> Result<ParameterKeys, VaryError> {
+    pub fn parse_with_lists(text: &str) -> Result<ParameterKeys, VaryError> {
         match EntryPath::parse(text.trim()) {
-            Ok(part) if part.is_whole_vector() => {
+            Ok(part) if part.is_whole_list() => {
                 Ok(ParameterKeys(vec![VariableTarget::Entry(part)]))
             }
             _ => text.parse(),
@@ -615,6 +615,11 @@ impl BaseScenario {
                 Some(_) => return refuse("has another value than the keys it is joined to"),
                 None => {
                     let value = self.entries.value_at(part);
+                    if let Some(word) = value.and_then(|value| value.as_str()) {
+                        return refuse(&format!(
+                            "is \"{word}\" in the scenario: write its numbers there, or leave this key out"
+                        ));
+                    }
                     let entries = value.map(|value| part.number_paths(value));
                     let example = entries.and_then(|all| all.first().copied());
                     let example = example.map_or(String::new(), |one| format!(", as {one}"));
@@ -624,6 +629,19 @@ impl BaseScenario {
             }
         }
         found.ok_or_else(|| VaryError::Key(format!("{keys}: no number")))
+    }
+
+    /// All numbers that the scenario gives and with respect to which derivatives exist: of vectors, lists and
+    /// profiles every entry.
+    pub fn differentiable_numbers(&self) -> Vec<ParameterKeys> {
+        let given = Key::all()
+            .filter(|key| *key != Key::Tolerance)
+            .flat_map(|key| self.entries.paths_of_key(key))
+            .filter(|part| self.entries.is_given_in_row(part.key, part.row));
+        let each = given
+            .flat_map(|part| self.keys_by_entry(&ParameterKeys(vec![VariableTarget::Entry(part)])));
+        let numbers = each.filter(|keys| self.differentiable_value(keys).is_ok());
+        numbers.collect()
     }
 
     /// The `k`th of these values as a parameter of the scenario that has them all. `unit` is the

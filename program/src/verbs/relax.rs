@@ -17,7 +17,7 @@ use leafdyn::study;
 use leafdyn::study::{
     ColumnKind, DEFAULT_VEINS_TOLERANCE, Equilibria, LeafColumn, LeafQuantity, MarginError,
     MarginProgress, ParameterKeys, ParameterSweep, RefinedBlade, SensitivityError, Sweep,
-    SweepRequest, UnbendError, VeinsError, read_postures, relax_from_points,
+    SweepRequest, UnbendError, VaryError, VeinsError, read_postures, relax_from_points,
 };
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -63,15 +63,15 @@ pub struct RelaxArguments {
     #[arg(long, conflicts_with_all = ["keep_unstable", "modes", "segments"])]
     all: bool,
 
-    /// Also find how the tip, the energy and the lowest eigenvalue change with these numbers of the scenario
+    /// Also find how the tip, the energy and the lowest eigenvalue change with these numbers of the scenario; all: with every one that it gives
     #[arg(
         long,
         value_name = "KEY,...",
         value_delimiter = ',',
-        value_parser = ParameterKeys::parse_with_vectors,
+        value_parser = parse_sensitivity,
         conflicts_with = "all"
     )]
-    sensitivity: Vec<ParameterKeys>,
+    sensitivity: Vec<SensitivityChoice>,
 
     /// Also find how far a stable leaf is from losing its stability: which push at the tip unseats it, and the lowest barrier to another equilibrium
     #[arg(long, conflicts_with_all = ["all", "sensitivity"])]
@@ -126,6 +126,21 @@ fn parse_veins(text: &str) -> Result<VeinsChoice, String> {
         None => return Err(refused()),
     };
     Ok(VeinsChoice::Refined(tolerance))
+}
+
+/// With respect to which numbers a leaf is differentiated.
+#[derive(Clone, Debug)]
+enum SensitivityChoice {
+    /// Every one that the scenario gives.
+    Every,
+    These(ParameterKeys),
+}
+
+fn parse_sensitivity(text: &str) -> Result<SensitivityChoice, VaryError> {
+    match text.trim() {
+        "all" => Ok(SensitivityChoice::Every),
+        text => ParameterKeys::parse_with_lists(text).map(SensitivityChoice::These),
+    }
 }
 
 fn update_margin_progress(line: &mut ProgressLine, progress: &MarginProgress, tolerance: f64) {
@@ -362,8 +377,14 @@ impl RelaxArguments {
         let mut line = job.progress_line();
         let tolerance = self.request.tolerance.unwrap_or(job.scenario.tolerance);
         if !self.sensitivity.is_empty() {
-            let (base, keys) = (&job.base, &self.sensitivity);
-            let found = study::relax_with_sensitivities(base, keys, options, &mut |progress| {
+            let base = &job.base;
+            let keys: Vec<ParameterKeys> = (self.sensitivity.iter())
+                .flat_map(|choice| match choice {
+                    SensitivityChoice::Every => base.differentiable_numbers(),
+                    SensitivityChoice::These(keys) => vec![keys.clone()],
+                })
+                .collect();
+            let found = study::relax_with_sensitivities(base, &keys, options, &mut |progress| {
                 line.update_solver(progress, tolerance);
             });
             return found.map_err(|error| match error {

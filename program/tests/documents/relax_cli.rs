@@ -75,6 +75,42 @@ fn stresses_are_told_where_sections_are_given() {
     assert!(!place.read("out/small/view.html").contains("\"stress\": \""));
 }
 
+/// `all` stands for every number that the scenario gives, one by one, and a list for its entries.
+#[test]
+fn every_number_that_is_given_has_a_derivative() {
+    let place = Workplace::new();
+    let text = "
+        name = 'rod'
+        leaf = { rods = 1, length = 10, fan = [0.1] }
+        section = { shape = 'circle', diameter = 0.2, young = 3e4 }
+        load = { tip_force = [0, 0, -1e-3] }
+        solve = { tolerance = 1e-5 }
+    ";
+    fs::write(place.path("rod.toml"), text).unwrap();
+    let changes = |keys: &str| {
+        let asked = format!("relax rod.toml --sensitivity {keys} --modes 0 --json --write none");
+        let found = place.run(&asked).ends(0).json();
+        found["sensitivities"].list().clone()
+    };
+    let all = changes("all");
+    let one_by_one = changes(
+        "leaf.length,leaf.fan[0],section.diameter,section.young,load.tip_force[0],load.tip_force[1],load.tip_force[2]",
+    );
+    let by_key = |list: &[Value]| {
+        let mut list = list.to_vec();
+        list.sort_by_key(|one| one["key"].to_string());
+        list
+    };
+    assert_eq!(by_key(&all), by_key(&one_by_one));
+    let fan = changes("leaf.fan");
+    assert_eq!(fan.len(), 1);
+    assert_eq!(fan[0]["key"], json!("leaf.fan[0]"));
+    place.refuses(
+        "relax leaf.toml --sensitivity leaf.fan --set leaf.fan=paper",
+        "leaf.fan: is \"paper\" in the scenario: write its numbers there",
+    );
+}
+
 #[test]
 fn json_is_alone_on_standard_output() {
     let place = Workplace::new();

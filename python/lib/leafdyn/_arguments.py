@@ -41,11 +41,12 @@ def numbers(**given: float | None) -> None:
             raise ValueError(f"{name} = {found!r}: must be a number up to {sys.float_info.max:.1e}") from None
 
 
-def seconds(time_limit: float | None) -> None:
-    """Refuse what is no time limit."""
-    numbers(time_limit=time_limit)
-    if time_limit is not None and not time_limit > 0:
-        raise ValueError(f"time_limit = {time_limit}: must be a positive number of seconds")
+def seconds(**limits: float | None) -> None:
+    """Refuse what are no limits of time."""
+    numbers(**limits)
+    for name, limit in limits.items():
+        if limit is not None and not limit > 0:
+            raise ValueError(f"{name} = {limit}: must be a positive number of seconds")
 
 
 def switches(**given: bool) -> None:

@@ -343,7 +343,8 @@ class Equilibrium(Viewed):
             return Sensitivities()
         places = {found[0]: found[1:] for found in self._core.position_changes()}
         entries = self.to_dict()["sensitivities"]
-        return Sensitivities({entry["key"]: Sensitivity(entry, *places[entry["key"]]) for entry in entries})
+        found = [Sensitivity(entry, *places[entry["key"]]) for entry in entries]
+        return Sensitivities(found, self.name, self._units)
 
     @property
     def margin(self) -> dict[str, Any] | None:

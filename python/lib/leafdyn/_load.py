@@ -178,7 +178,7 @@ def _leaf(said: Said, files: Kept, scenario: Scenario, nodes: dict[str, NDArray[
         "curves": positions,
         "curve_stations": stations,
         "sensitivities": Sensitivities(
-            {entry["key"]: Sensitivity(entry, np.empty(0), nowhere, None) for entry in entries}
+            [Sensitivity(entry, np.empty(0), nowhere, None) for entry in entries], scenario.name, scenario.units
         ),
         "grip_reactions": [_force_and_moment(grip) for grip in said.get("grip_reactions") or []],
         "base_reactions": [_force_and_moment(base) for base in on_bases],

@@ -151,7 +151,8 @@ class Motion(Viewed):
 
     def plot(self, ax: Any = None, **style: Any) -> Any:
         """Draw the coordinate of the tip that varies most in time with matplotlib; of a held tip, that of the middle of
-        the veins. Axes have the units that the scenario names.
+        the veins. Within the band around it, where there is one, the error is known to be. Axes have the units that the
+        scenario names.
 
         Parameters
         ----------
@@ -169,8 +170,12 @@ class Motion(Viewed):
         points = self.positions[:, :, self.positions.shape[2] // 2] if held else self.tips
         changes = np.ptp(points, axis=0).max(axis=0)
         most = "xyz"[max((2, 1, 0), key=lambda axis: float(changes[axis]))]
-        lines = ((self.times, height) for height in points[..., "xyz".index(most)].T)
-        curves(ax, lines, self.name, style)
+        heights = points[..., "xyz".index(most)].T
+        curves(ax, ((self.times, height) for height in heights), self.name, style)
+        for height in heights:
+            # Gaps where the bound is not known.
+            band = ax.fill_between(self.times, height - self.errors, height + self.errors, alpha=0.25, linewidth=0.0)
+            band.set_facecolor(ax.lines[-1].get_color())
         height = labelled(f"{'middle' if held else 'tip'} {most}", column_unit(self._units, most))
         ax.set(xlabel=labelled("time", unit(self._units, (0, 0, 1))), ylabel=height)
         return ax

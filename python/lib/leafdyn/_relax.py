@@ -15,7 +15,6 @@ from ._points import Points, point_table
 from ._progress import Heard, Progress, reporter
 from ._refused import RefusedLeaf
 from ._scenario import Scenario, Source, checked
-from ._tables import given
 
 
 def asked_for(
@@ -35,6 +34,7 @@ def asked_for(
     veins: str | tuple[str, float] | None = None,
     veins_error: bool = False,
     time_limit: float | None = None,
+    time_limit_each: float | None = None,
 ) -> dict[str, Any]:
     asked = {
         **locals(),
@@ -45,7 +45,7 @@ def asked_for(
     }
     whole(segments=segments, intervals=intervals, modes=modes, stations=stations)
     numbers(tolerance=tolerance)
-    seconds(time_limit)
+    seconds(time_limit=time_limit, time_limit_each=time_limit_each)
     switches(
         keep_unstable=keep_unstable,
         full_model=full_model,
@@ -246,6 +246,7 @@ def relax_many(
     stations: SupportsIndex | None = None,
     on_error: Literal["raise"] = "raise",
     time_limit: float | None = None,
+    time_limit_each: float | None = None,
     progress: Progress = None,
 ) -> list[Equilibrium]: ...
 
@@ -267,6 +268,7 @@ def relax_many(
     stations: SupportsIndex | None = None,
     on_error: Literal["row"],
     time_limit: float | None = None,
+    time_limit_each: float | None = None,
     progress: Progress = None,
 ) -> list[Equilibrium | RefusedLeaf]: ...
 
@@ -287,6 +289,7 @@ def relax_many(
     stations: SupportsIndex | None = None,
     on_error: Literal["raise", "row"] = "raise",
     time_limit: float | None = None,
+    time_limit_each: float | None = None,
     progress: Progress = None,
 ) -> list[Equilibrium] | list[Equilibrium | RefusedLeaf]:
     """Find how many leaves come to rest, side by side on all threads.
@@ -303,6 +306,8 @@ def relax_many(
     time_limit
         Seconds for all leaves together; those that are not at rest then have the outcome ``"out-of-time"``, and are as far
         as they came: use the numbers of those alone that have ``success``. In the table of `sweep` the others are missing.
+    time_limit_each
+        The same for each leaf, from its own beginning: one that takes too long takes no time from the others.
 
     Returns
     -------
@@ -336,6 +341,7 @@ def relax_many(
         path=path,
         veins_error=veins_error,
         time_limit=time_limit,
+        time_limit_each=time_limit_each,
     )
     told = tells_refusals(on_error)
     leaves: list[Scenario | RefusedLeaf] = []
@@ -401,6 +407,7 @@ def modes(
     keep_unstable: bool = False,
     full_model: bool = False,
     stations: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and its lowest modes of vibration there, with their shapes.
@@ -423,7 +430,9 @@ def modes(
     ((2,), True)
     """
     whole(count=count)
-    asked = asked_for("semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations)
+    asked = asked_for(
+        "semi-implicit", tolerance, segments, None, keep_unstable, full_model, count, True, stations, time_limit=time_limit
+    )
     leaf = checked(scenario, set)
 
     def made(core: _leafdyn.Leaf) -> Equilibrium:
@@ -447,6 +456,7 @@ def sensitivities(
     full_model: bool = False,
     modes: SupportsIndex = 3,
     stations: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Equilibrium:
     """Find how a leaf comes to rest, and how that changes with numbers of its scenario: derivatives, with errors.
@@ -485,65 +495,23 @@ def sensitivities(
     True
     """
     words = texts("keys", keys, "stiffness.axial")
-    asked = asked_for(method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words)
+    asked = asked_for(
+        method, tolerance, segments, None, keep_unstable, full_model, modes, False, stations, words, time_limit=time_limit
+    )
     leaf = checked(scenario, set)
-    every = words == ["all"]
-    if every:
-        asked["sensitivity"] = _numbers(leaf)
 
     def made(core: _leafdyn.Leaf) -> Equilibrium:
         return Equilibrium(core, (leaf, asked))
 
     with reporter(progress) as heard, keeping(made):
-        while True:
-            try:
-                found = made(_leafdyn.relax(leaf._core, asked, heard))
-                break
-            except ValueError as refused:
-                # Keys are refused one by one, before the leaf is solved.
-                asked["sensitivity"] = _without_refused(leaf, asked["sensitivity"], str(refused), every)
-                if not asked["sensitivity"]:
-                    raise
+        found = made(_leafdyn.relax(leaf._core, asked, heard))
     warn(found.name, found.remark, *found.doubts)
-    if found.success and not every:
+    if found.success and words != ["all"]:
         keys_found = tuple(found.sensitivities)
         none = [word for word in words if not any(_is_of(key, word.strip()) for key in keys_found)]
         if none:
             warn(found.name, f"no sensitivity by {', '.join(none)}: the leaf at rest does not depend on it, or not smoothly")
     return found
-
-
-def _numbers(leaf: Scenario) -> list[str]:
-    """Keys of all that the scenario gives as numbers."""
-    entries = given(leaf.text, leaf.overrides)
-    return [key for key, value in entries.items() if _is_numeric(value)]
-
-
-def _is_numeric(value: Any) -> bool:
-    if isinstance(value, Mapping):
-        value = value.get("value")
-    if isinstance(value, list):
-        return bool(value) and all(_is_numeric(part) for part in value)
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
-
-
-def _without_refused(leaf: Scenario, words: list[str], message: str, every: bool) -> list[str]:
-    """Keys for which to ask in place of those that were refused: of a list its entries; none if it stays refused."""
-    key, _, why = message.partition(": ")
-    # The program may name an entry of what was asked for.
-    word = next((word for word in words if _is_of(key, word.strip())), None)
-    if word is None:
-        return []
-    entries: list[str] = []
-    if why.startswith("is a list: give an index"):
-        found = given(leaf.text, leaf.overrides).get(word.strip())
-        if isinstance(found, str):
-            raise ValueError(f"{word}: is {found!r} in the scenario: write its numbers there, or leave this key out")
-        entries = [f"{word}[{number}]" for number in range(len(found) if isinstance(found, list) else 0)]
-    if not entries and not every:
-        return []
-    at = words.index(word)
-    return [*words[:at], *entries, *words[at + 1 :]]
 
 
 def _is_of(key: str, word: str) -> bool:

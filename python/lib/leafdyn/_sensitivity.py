@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ._attribute import Attribute
-from ._data import pandas
+from ._data import column_unit, pandas
+from ._draw import axes, labelled
 from ._result import read_only
 
 if TYPE_CHECKING:
@@ -79,14 +81,27 @@ class Sensitivity:
         return f"<Sensitivity by {self.key} = {self.value:.6g}{tip}{within}>"
 
 
+SHARE = 0.01
+"""Of every number: what it is changed by in a figure."""
+
+MOST_BARS = 40
+"""Of a figure: those that change it most."""
+
+
 class Sensitivities(dict[str, Sensitivity]):
-    """Sensitivities by the keys of the numbers: a dict, and a table."""
+    """Sensitivities by the keys of the numbers: a dict, a table, and a figure."""
+
+    def __init__(self, found: Iterable[Sensitivity] = (), name: str = "", units: Mapping[str, str] | None = None) -> None:
+        super().__init__({one.key: one for one in found})
+        self._name, self._units = name, dict(units or {})
 
     def to_pandas(self) -> _DataFrame:
         """A ``pandas.DataFrame`` with a row for each ``key``: its ``value``, and by how much results change with it, by one
         unit of the number, each with a bound on its error behind it (but for frequencies): ``tip_x`` (of the joint tip, or
         the first rod's), ``energy``, ``lowest_eigenvalue``, ``frequency_1`` and so on, ``reaction_x`` (of a held tip) and
-        ``grip_1_x``, as the columns of `leafdyn.sweep`. What is not known is not a number.
+        ``grip_1_x``, as the columns of `leafdyn.sweep`. What is not known is not a number. The unit of a change is that of
+        the result, ``attrs["units"]`` by columns, over that of the number, ``attrs["key_units"]`` by keys, as far as the
+        scenario names them.
 
         Examples
         --------
@@ -100,7 +115,48 @@ class Sensitivities(dict[str, Sensitivity]):
         rows = {key: _row(one) for key, one in self.items()}
         found = pandas().DataFrame.from_dict(rows, orient="index", dtype=np.float64)
         found.index.name = "key"
+        named = {column: column_unit(self._units, column.removesuffix("_error")) for column in found.columns}
+        keys = {key: column_unit(self._units, key) for key in self}
+        found.attrs = {"scenario": self._name, "units": _known(named), "key_units": _known(keys)}
         return found
+
+    def plot(self, column: str | None = None, ax: Any = None) -> Any:
+        """Draw by how much a result changes with 1 % of every number, largest first, with matplotlib; where the error is
+        known it is a bar across the end.
+
+        Parameters
+        ----------
+        column
+            A column of `to_pandas`; left out: of the tip, or of the force on its holder, the coordinate that changes most.
+        ax
+            Where; left out: axes in a new figure.
+
+        Returns
+        -------
+        matplotlib Axes
+        """
+        rows = {key: _row(one) for key, one in self.items() if one.value}
+        changes = {key: {name: SHARE * row["value"] * of for name, of in row.items()} for key, row in rows.items()}
+        every = next(iter(changes.values()), {})
+        if column is None:
+            held = "reaction_x" in every
+            names = [f"{'reaction' if held else 'tip'}_{axis}" for axis in "zxy"]
+            column = max(names, key=lambda name: max((abs(row[name]) for row in changes.values()), default=0.0))
+        elif every and (column not in every or column == "value" or column.endswith("_error")):
+            known = [name for name in every if name != "value" and not name.endswith("_error")]
+            raise ValueError(f"column = {column!r}: must be one of {', '.join(known)}")
+        shown = sorted(changes, key=lambda key: abs(changes[key][column]))[-MOST_BARS:]
+        errors = [abs(changes[key].get(f"{column}_error", math.nan)) for key in shown]
+        ax = axes(ax)
+        ax.barh(shown, [changes[key][column] for key in shown], xerr=[it if math.isfinite(it) else 0.0 for it in errors])
+        ax.axvline(0.0, color="black", linewidth=0.8)
+        ax.set(xlabel=labelled(f"change of {column} by 1 % of each", column_unit(self._units, column)), title=self._name)
+        ax.figure.set_layout_engine("constrained")
+        return ax
+
+
+def _known(units: Mapping[str, str | None]) -> dict[str, str]:
+    return {name: unit for name, unit in units.items() if unit is not None}
 
 
 def _row(one: Sensitivity) -> dict[str, float]:

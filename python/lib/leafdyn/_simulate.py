@@ -74,7 +74,7 @@ def simulate(
     ('completed', True)
     """
     leaf, core = _motion(scenario, set, method, segments, step, tolerance)
-    seconds(time_limit)
+    seconds(time_limit=time_limit)
 
     def made(outputs: int) -> Motion | None:
         return Motion(core, leaf.name, leaf.joined) if outputs else None

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from itertools import product
 from math import nan
+from time import monotonic
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple, SupportsIndex, TypeAlias, Union
 
 import numpy as np
@@ -58,6 +59,7 @@ def sweep(
     full_model: bool = False,
     on_error: Literal["raise", "row"] = "raise",
     time_limit: float | None = None,
+    time_limit_each: float | None = None,
     client: Any = None,
     progress: Progress = None,
 ) -> _DataFrame:
@@ -79,8 +81,9 @@ def sweep(
         and the others stay, but a ``section`` with a ``shape`` takes the place of the whole one. Or the program's words,
         ``"load.gravity[2]=-1..-4:20"``, or a list of such texts.
 
-        Samples are rows, one leaf each: a ``pandas.DataFrame`` whose columns are keys, or a list of dicts of which a key
-        that a row does not have is as in the scenario. The rows of the result have the index of the ``DataFrame``.
+        Samples are rows, one leaf each, and what keys with values of their own for each leaf need: a ``pandas.DataFrame``
+        whose columns are keys, without a missing cell, or a list of dicts of which a key that a row does not have is as
+        in the scenario. The rows of the result have the index of the ``DataFrame``, where names of samples belong.
     columns
         ``"tip_x"``, ``"tip_y"``, ``"tip_z"`` (of the joint tip or the first rod's), ``"base_reaction_x"`` and so on (the
         force on the supports of all bases), ``"base_moment_x"`` (the moment about their mean), ``"reaction_x"`` (of a
@@ -99,6 +102,8 @@ def sweep(
     time_limit
         Seconds for all leaves together, or with a client for each; those that are not at rest then have the outcome
         ``"out-of-time"``, and all else of them is missing, as of those that are refused.
+    time_limit_each
+        The same for each leaf, from its own beginning: one that takes too long takes no time from the others.
     client
         A ``dask.distributed.Client``, whose workers then solve the leaves.
 
@@ -164,6 +169,7 @@ def sweep(
         path=path,
         veins_error="error_in_veins" in kinds,
         time_limit=time_limit,
+        time_limit_each=time_limit_each,
     )
     told = tells_refusals(on_error)
     base = checked(scenario, set)
@@ -316,13 +322,30 @@ def _leaves(base: Scenario, samples: Samples, told: bool) -> list[Scenario | Ref
             leaves.append(Scenario(base, {key: value for keys, value in point.items() for key in keys.split("+")}))
         except (ValueError, TypeError) as refused:
             unknown += [refused] if unknown_key(refused) else []
-            refused.args = (f"{samples.place(number)}: {refused}",)
+            refused.args = (f"{samples.place(number)}: {refused}{_advice(samples, point, refused)}",)
             if not told:
                 raise
             leaves.append(RefusedLeaf(str(refused)))
     if unknown and len(unknown) == len(leaves):
         raise unknown[0]
     return leaves
+
+
+def _advice(samples: Samples, point: Mapping[str, Any], refused: Exception) -> str:
+    """What to do about a sample that is refused because of how it was given."""
+    if not samples.is_table:
+        each = next((key for key, value in point.items() if isinstance(value, (tuple, list)) and "+" in key), None)
+        apart = each is not None and len(point[each]) == len(each.split("+"))
+        return "; keys with values of their own are columns of a DataFrame, a row for each leaf" if apart else ""
+    missing = [key for key, value in point.items() if _is_missing(value)]
+    if missing:
+        return f"; the cell is missing: fill it, or leave {missing[0]} out of this row in a list of dicts"
+    name = unknown_key(refused)
+    return "; what is no key belongs into the index: set_index" if name and "." not in name and name in point else ""
+
+
+def _is_missing(value: Any) -> bool:
+    return value is None or bool(np.ndim(value) == 0 and pandas().isna(value))
 
 
 class Kind(NamedTuple):
@@ -377,6 +400,7 @@ def _solved(
 ) -> list[Row]:
     """What is wanted of every leaf, and whether it is at rest; where it is interrupted none of those not finished."""
     rows: list[Row] = []
+    begun = monotonic()
     at_once = min(AT_ONCE, AT_ONCE_WITH_MODES) if asked["mode_shapes"] else AT_ONCE
     for begin in range(0, len(leaves), at_once):
 
@@ -388,8 +412,12 @@ def _solved(
             last = [None if leaf is None else _of(leaf, wanted, kinds) for leaf in found]
             return [*rows, *last, *[None] * (len(leaves) - len(rows) - len(last))]
 
+        now = asked
+        if asked["time_limit"] is not None:
+            # What those before have left of the time of all.
+            now = {**asked, "time_limit": max(begun + asked["time_limit"] - monotonic(), 0.0)}
         with keeping(with_those_before):
-            found = relaxed(leaves[begin : begin + at_once], asked, None if heard is None else passed_on, told)
+            found = relaxed(leaves[begin : begin + at_once], now, None if heard is None else passed_on, told)
         rows += [_of(leaf, wanted, kinds) for leaf in found]
     return rows
 

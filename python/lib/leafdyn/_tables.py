@@ -1,9 +1,9 @@
-"""Whole tables of a scenario among the entries that are replaced, and the entries of a scenario by their keys."""
+"""Whole tables of a scenario among the entries that are replaced."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import import_module
 from typing import Any
@@ -74,29 +74,3 @@ def _toml() -> Any:
         except ImportError:
             continue
     raise ImportError("whole tables of a text need Python 3.11: pip install tomli, or give the scenario as a dict")
-
-
-def given(text: str, overrides: list[str]) -> dict[str, Any]:
-    """What a scenario has, by keys: a list and a profile as a whole, of lists of tables every entry.
-
-    >>> given("[load]\\ng = [0, 0, -1]\\n[[load.point]]\\nat = 0.5", ["leaf.rods=3"])
-    {'load.g': [0, 0, -1], 'load.point[0].at': 0.5, 'leaf.rods': 3}
-    """
-    found = dict(_flat("", read(text)))
-    for entry in overrides:
-        key, _, value = entry.partition("=")
-        if not key.strip().startswith("scale:"):
-            found |= dict(_flat("", {key.strip(): next(iter(read(f"value = {value}").values()))}))
-    return found
-
-
-def _flat(within: str, value: Any) -> Iterator[tuple[str, Any]]:
-    tables = isinstance(value, list) and bool(value) and all(isinstance(part, Mapping) for part in value)
-    if isinstance(value, Mapping) and "value" not in value:
-        for name, part in value.items():
-            yield from _flat(f"{within}.{name}".lstrip("."), part)
-    elif tables:
-        for number, part in enumerate(value):
-            yield from _flat(f"{within}[{number}]", part)
-    else:
-        yield within, value

@@ -322,7 +322,7 @@ impl Entries {
     }
 
     /// Whether a value of the key is written in one of its tables, if there may be several.
-    pub(in crate::scenario) fn is_given_in_row(&self, key: Key, row: usize) -> bool {
+    pub(crate) fn is_given_in_row(&self, key: Key, row: usize) -> bool {
         self.entry(key, row).is_some()
     }
 

@@ -192,16 +192,20 @@ impl EntryPath {
         self.list.is_none() && self.indices[0].is_none() && !self.scale
     }
 
-    /// Whether the path names a vector along the lab axes, and none of its components.
-    pub(crate) fn is_whole_vector(&self) -> bool {
-        let vector = matches!(
+    /// Whether the path names a vector or another list that is always one, and none of its entries.
+    pub(crate) fn is_whole_list(&self) -> bool {
+        let list = matches!(
             self.key.form(),
             ValueSchema::Vector
                 | ValueSchema::VectorOrInTime
                 | ValueSchema::VectorPerRod
                 | ValueSchema::VectorQuantity(_)
+                | ValueSchema::Fan
+                | ValueSchema::AxisStiffness
+                | ValueSchema::AcrossSection
+                | ValueSchema::Pixel
         );
-        vector && self.is_whole()
+        list && self.is_whole()
     }
 
     /// Whether the path names a place where nodes must be, on the way from the base to the tip.
