@@ -126,11 +126,7 @@ impl TriangleMesh {
         let count = sheet.vertices.len();
         let half = |k: usize| {
             let (vein, sigma) = (sheet.veins[k] as usize - 1, sheet.uv[k][0]);
-            let thickness = match &scenario.blade {
-                Some(blade) => Some(blade.thickness(vein, sigma)),
-                None => scenario.radii.thickness(vein, sigma),
-            };
-            thickness.map(|thickness| 0.5 * thickness)
+            (scenario.thickness(vein, sigma)).map(|thickness| 0.5 * thickness)
         };
         let halves: Option<Vec<f64>> = (0..count).map(half).collect();
         let halves = halves.ok_or(NoSurface::NoThickness)?;

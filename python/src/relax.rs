@@ -126,17 +126,17 @@ impl Asked {
             mode_shapes: self.mode_shapes || (self.modes > 0 && method.is_shooting()),
             every_node: true,
             stations: self.stations,
-            limit: self.limit(),
+            limit: limit(self.time_limit),
             ..Options::default()
         })
     }
+}
 
-    /// The limit of the time that begins now.
-    fn limit(&self) -> Limit {
-        Limit {
-            deadline: deadline(self.time_limit),
-            ..Limit::default()
-        }
+/// The limit of the time that begins now.
+pub fn limit(seconds: Option<f64>) -> Limit {
+    Limit {
+        deadline: deadline(seconds),
+        ..Limit::default()
     }
 }
 

@@ -24,8 +24,9 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 /// Interval between checks for signals and progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// How long a run that Ctrl-C ends may take to hand over what it has found.
-const PATIENCE: Duration = Duration::from_millis(120);
+/// How long a run that Ctrl-C ends may take to hand over what it has found, unless a second Ctrl-C ends that, too: of
+/// minutes of work the last points are still to be brought to their accuracy.
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Most threads that can be requested.
 const MOST_THREADS: usize = 1024;
@@ -306,27 +307,37 @@ pub fn run<T: Send + 'static>(
 }
 
 /// Does `work` on the pool, which ends with what it has found when its monitor is cancelled. That is kept
-/// after Ctrl-C, which `interrupt` then has, if it comes within [`PATIENCE`].
+/// after Ctrl-C, which `interrupt` then has, if it comes within [`PATIENCE`] and before another Ctrl-C.
 pub fn run_keeping<T: Send + 'static>(
     py: Python,
     progress: Option<&Bound<PyAny>>,
     interrupt: &mut Interrupt,
     work: impl FnOnce(&Monitor) -> T + Send + 'static,
 ) -> PyResult<T> {
-    let (stop, result) = match wait_for(py, progress, work)? {
+    let (stop, mut result) = match wait_for(py, progress, work)? {
         Waited::Ended(found) => return Ok(found),
         Waited::Stopped(stop, result) => (stop, result),
     };
     if !is_interrupt(py, &stop) {
         return Err(stop);
     }
-    match py.detach(move || result.recv_timeout(PATIENCE)) {
-        Ok(Ok(found)) => {
-            interrupt.0 = Some(stop);
-            Ok(found)
+    let clock = Instant::now();
+    while clock.elapsed() < PATIENCE {
+        let received;
+        (received, result) = py.detach(move || (result.recv_timeout(POLL_INTERVAL), result));
+        match received {
+            Ok(Ok(found)) => {
+                interrupt.0 = Some(stop);
+                return Ok(found);
+            }
+            Err(RecvTimeoutError::Timeout) => {}
+            Ok(Err(_)) | Err(RecvTimeoutError::Disconnected) => break,
         }
-        _ => Err(stop),
+        if py.check_signals().is_err() {
+            break;
+        }
     }
+    Err(stop)
 }
 
 /// What a run sends: its result, or its panic.

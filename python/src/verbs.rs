@@ -4,7 +4,7 @@ use std::ffi::OsString;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use leafdyn::relax::{Limit, SemiImplicit};
+use leafdyn::relax::SemiImplicit;
 use leafdyn::scenario;
 use leafdyn::study::{
     self, BoundaryRequest, ChartError, ChartOptions, ChartProgress, CheckOptions,
@@ -16,7 +16,7 @@ use pyo3::prelude::*;
 use crate::arrays::{array, curves, nodes};
 use crate::errors::{value_error, vary_error};
 use crate::range::Range;
-use crate::relax::{check_stations, refuse, reporter};
+use crate::relax::{check_stations, limit, refuse, reporter};
 use crate::result::{Files, Leaf};
 use crate::run::{Interrupt, elapsed, interrupted, is_interrupt, on_pool, run, run_keeping};
 use crate::scenario::Scenario;
@@ -71,9 +71,11 @@ pub fn equilibria(
     tolerance: Option<f64>,
     full_model: bool,
     stations: Option<usize>,
+    time_limit: Option<f64>,
     progress: Option<&Bound<PyAny>>,
 ) -> PyResult<Equilibria> {
     check_stations(stations)?;
+    let mut limit = limit(time_limit);
     let mut interrupt = Interrupt::default();
     let scenario = scenario.checked.clone();
     let input = scenario.clone();
@@ -87,7 +89,8 @@ pub fn equilibria(
                 format!("{starts} starts, {found} equilibria")
             });
         };
-        study::equilibria(&scenario, how, tolerance, &monitor.limit(), &mut report)
+        monitor.watch(&mut limit);
+        study::equilibria(&scenario, how, tolerance, &limit, &mut report)
     })?;
     let mut all = interrupt.or_else(found, value_error)?;
     for one in &mut all.found {
@@ -116,6 +119,8 @@ pub struct Asked {
     segments: Option<usize>,
     tolerance: Option<f64>,
     points: Option<usize>,
+    /// Seconds after which the run ends with what it has.
+    time_limit: Option<f64>,
 }
 
 impl Asked {
@@ -131,7 +136,7 @@ impl Asked {
             segments: self.segments,
             tolerance: self.tolerance,
             most_points: self.points.unwrap_or(MOST_POINTS),
-            limit: Limit::default(),
+            limit: limit(self.time_limit),
         })
     }
 }
@@ -155,7 +160,7 @@ pub fn trace<'py>(
     let mut request = asked.request(py, scenario, &vary)?;
     let mut interrupt = Interrupt::default();
     let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
-        request.limit = monitor.limit();
+        monitor.watch(&mut request.limit);
         let mut report = |branch: usize, points: usize, value: f64| {
             monitor.report(points as f64, None, || {
                 format!("branch {}, {points} points, at {value:.6}", branch + 1)
@@ -194,7 +199,7 @@ pub fn boundary<'py>(
         across: across.vary(py)?,
     };
     let found = run_keeping(py, progress, &mut interrupt, move |monitor| {
-        request.trace.limit = monitor.limit();
+        monitor.watch(&mut request.trace.limit);
         let mut report = |curve: Option<usize>, points: usize, [first, second]: [f64; 2]| {
             monitor.report(points as f64, None, || {
                 let what = curve.map_or("trace".into(), |curve| format!("curve {}", curve + 1));

@@ -316,6 +316,16 @@ remarks! {
             /// Where its stretch is not positive.
             station: f64,
         } = "inverted",
+        /// Flat sections in wind that turn another width to it than that of the drag.
+        #[error(
+            "the drag has the whole wind.width however the sections are turned: on the leaf at rest they turn {:.0} % of \
+             it to the air that flows past, weighted by the drag",
+            100.0 * .part
+        )]
+        TurnedFromWind {
+            /// The width that sections turn to the air over that of the drag.
+            part: f64,
+        } = "turned-from-wind",
         /// A path whose events lead elsewhere on another grid.
         #[error(
             "where the leaf lost its stability while it was loaded, it moves to different equilibria on \

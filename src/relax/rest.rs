@@ -28,7 +28,7 @@ use crate::relax::solve_on_grid::{check_segments, explicit};
 use crate::relax::stability::{Decision, Verdict, decide, state_from_rod_shapes};
 use crate::relax::{eigenvalues, nested_grids};
 use crate::run::{Instant, RefusedOption};
-use crate::scenario::Scenario;
+use crate::scenario::{Scenario, assumed_rotary_inertia};
 use crate::shape::{NodeState, RodShape};
 use glam::DVec3;
 
@@ -281,6 +281,11 @@ pub(super) fn equilibrium_with_stability(
         leaf.path = None;
     }
     leaf.doubts = report::implausible_properties(problem.leaf.scenario(), &leaf);
+    if leaf.outcome.is_at_rest() && (requested > 0 || !problem.leaf.has_potential()) {
+        // Small motions depend on it, and a leaf at rest does not.
+        let assumed = assumed_rotary_inertia(problem.leaf.scenario());
+        (leaf.doubts).extend(assumed.map(EquilibriumDoubt::Implausible));
+    }
     let doubt = (leaf.path.as_ref())
         .and_then(|path| EquilibriumDoubt::about_path(path, problem.options.route));
     let unconfirmed = doubt.is_none() && found.unconfirmed && leaf.outcome.is_at_rest();

@@ -324,7 +324,10 @@ impl Scenario {
             (self.couple.is_some(), Key::Couple.path()),
             (free_tips && acts(&self.tip_force), Key::TipForce.path()),
             (self.coupling.iter().any(acts), "coupling"),
-            (self.wind.is_some(), Key::WindWidth.path()),
+            (
+                self.wind.is_some() && !self.wind_width_follows_from_source(),
+                Key::WindWidth.path(),
+            ),
             (acts(&self.g) && !blade_mass, Key::Density.path()),
         ];
         keys.into_iter().find_map(|(acts, key)| acts.then_some(key))
@@ -474,6 +477,11 @@ impl Scenario {
             if density_before == before.profile(Property::Density) {
                 dynamics.density[vein] = section.profile(Property::Density);
             }
+            if let Some(wind) = &mut self.wind
+                && wind.width[vein] == before.profile(Property::Width)
+            {
+                wind.width[vein] = section.profile(Property::Width);
+            }
             for (axis, of_vein) in dynamics.rotary_inertia[vein].iter_mut().enumerate() {
                 let gyration = Property::SquaredGyration(axis);
                 if *of_vein == density_before.times(&before.profile(gyration)) {
@@ -483,6 +491,14 @@ impl Scenario {
         }
         self.radii = Radii::from_sections(sections);
         true
+    }
+
+    /// The thickness of a rod's section, or of a blade along a vein, at a fraction of its length, if one of them is given.
+    pub(crate) fn thickness(&self, rod: usize, sigma: f64) -> Option<f64> {
+        match &self.blade {
+            Some(blade) => Some(blade.thickness(rod, sigma)),
+            None => self.radii.thickness(rod, sigma),
+        }
     }
 
     /// Young's modulus of a rod's section, or of a blade along a vein, if one of them is given and the modulus is the

@@ -288,6 +288,7 @@ impl Scenario {
             Key::WindVelocity => vectors_value(&wind.velocity),
             Key::WindDensity => number_value(wind.density),
             Key::WindDrag => number_value(wind.drag),
+            _ if self.wind_width_follows_from_source() => return None,
             _ => quantity_value(wind.width.iter()),
         })
     }
@@ -411,6 +412,29 @@ impl Scenario {
         };
         let density = give(&self.dynamics.density, Property::Density);
         Some(SerializedSections { sections, density })
+    }
+
+    /// What the stiffnesses follow from, unless that is numbers.
+    fn stiffness_source(&self) -> Option<StiffnessSource> {
+        match &self.blade {
+            Some(blade) => Some(StiffnessSource::from_blade(blade.clone())),
+            None if !self.radii.sections().is_empty() => {
+                Some(StiffnessSource::Sections(self.radii.sections().to_vec()))
+            }
+            None => None,
+        }
+    }
+
+    /// The width of every vein along d2: of its section, or of its strip of a blade; none where numbers are given in
+    /// place of these.
+    pub(crate) fn vein_widths(&self) -> Option<Vec<Profile>> {
+        self.stiffness_source()?.property_profiles(Property::Width)
+    }
+
+    /// Whether the width in the wind is that of the sections, or of the strips of a blade.
+    pub(crate) fn wind_width_follows_from_source(&self) -> bool {
+        let widths = self.wind.as_ref().map(|wind| &wind.width);
+        widths.is_some() && widths == self.vein_widths().as_ref()
     }
 
     /// Whether the rotary inertia is that of the densities and the sections, or the strips of a blade.

@@ -186,7 +186,7 @@ const LIMITS: LeafLimits = LeafLimits {
     ),
     wind_velocity: upper_limit("|U| T/L", 1e12, NATURAL_UNITS_REASON),
     landing_velocity: upper_limit("|v| T/L", 1e12, NATURAL_UNITS_REASON),
-    wind_width: ratio_limit(
+    wind_width: upper_limit(
         "w/L",
         1e6,
         "L is the longest rod: choose one closer to the width of a rod",
@@ -780,12 +780,11 @@ fn check_wind(entries: &Entries, scenario: &Scenario) -> ScenarioResult<()> {
             LIMITS.drag.check(item, pressure * width.max_abs() / unit)?;
         }
     }
+    let Some(item) = entries.given_value(Key::WindWidth) else {
+        return Ok(());
+    };
     let longest = longest(&scenario.rods);
-    LIMITS.wind_width.check_profiles(
-        entries.value_or_default(Key::WindWidth)?,
-        &wind.width,
-        longest,
-    )
+    (LIMITS.wind_width).check_profiles(item, &wind.width, longest)
 }
 
 /// The range of a dimensionless number.

@@ -349,24 +349,40 @@ pub struct Wind {
     pub density: f64,
     /// C_D, the drag coefficient; not negative.
     pub drag: f64,
-    /// w, the width that a vein turns to the wind, one profile per vein; positive.
+    /// w, the width that a vein turns to the wind however its section is turned, one profile per vein; not negative.
     pub width: Vec<Profile>,
 }
 
-/// Reads `[wind]`; `None` if there is no such table.
-pub(super) fn read_wind(entries: &Entries, rods: usize) -> ScenarioResult<Option<Wind>> {
+/// Reads `[wind]` of so many veins; `None` if there is no such table. Widths that are left out are those of the sections,
+/// or of the strips of a blade.
+pub(super) fn read_wind(
+    entries: &Entries,
+    rods: usize,
+    source: &StiffnessSource,
+) -> ScenarioResult<Option<Wind>> {
     if !entries.has_key_of_table("wind") {
         return Ok(None);
     }
-    Ok(Some(Wind {
-        velocity: entries
-            .value_or_default(Key::WindVelocity)?
-            .vectors_in_time()?,
-        density: entries.value_or_default(Key::WindDensity)?.number()?,
-        drag: entries.value_or_default(Key::WindDrag)?.number()?,
-        width: entries
+    let velocity = entries
+        .value_or_default(Key::WindVelocity)?
+        .vectors_in_time()?;
+    let density = entries.value_or_default(Key::WindDensity)?.number()?;
+    let drag = entries.value_or_default(Key::WindDrag)?.number()?;
+    let own = match entries.is_given(Key::WindWidth) {
+        true => None,
+        false => source.property_profiles(Property::Width),
+    };
+    let width = match own {
+        Some(width) => width,
+        None => entries
             .value_or_default(Key::WindWidth)?
             .profile_per_rod(rods)?,
+    };
+    Ok(Some(Wind {
+        velocity,
+        density,
+        drag,
+        width,
     }))
 }
 

@@ -49,8 +49,8 @@ pub use crate::scenario::loads::{
 pub use crate::scenario::photo::{Photo, PhotoParameterDerivative};
 pub use crate::scenario::plausibility::PlausibilityWarning;
 pub(crate) use crate::scenario::plausibility::{
-    LARGEST_PLAUSIBLE_STRETCH, held_tip_out_of_reach, plausibility_warnings,
-    probable_obstacle_to_rest,
+    LARGEST_PLAUSIBLE_STRETCH, assumed_rotary_inertia, held_tip_out_of_reach,
+    plausibility_warnings, probable_obstacle_to_rest,
 };
 pub(crate) use crate::scenario::profile::knot_places as knots;
 pub use crate::scenario::profile::{DerivedProfile, Profile, RodPlace, Side};

@@ -4,6 +4,7 @@
 use crate::run::remarks;
 use crate::scenario::checked::Scenario;
 use crate::scenario::loads::{Dynamics, PolarInertia};
+use crate::scenario::profile::Profile;
 use crate::scenario::supports::Clamp;
 use crate::scenario::veins::Rod;
 use glam::DVec3;
@@ -31,6 +32,8 @@ struct PlausibleRanges {
     degree_multiple: f64,
     /// Difference from a right angle that is one of digits left out.
     upright_tolerance: f64,
+    /// Multiple of the width of a blade that its veins do not turn to the wind together.
+    width_in_wind: f64,
 }
 
 const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
@@ -41,6 +44,7 @@ const PLAUSIBLE: PlausibleRanges = PlausibleRanges {
     weight_tolerance: 0.01,
     degree_multiple: 15.0,
     upright_tolerance: 1e-3,
+    width_in_wind: 1.5,
 };
 
 /// A unit of length, and the acceleration of gravity in it per second squared.
@@ -106,6 +110,18 @@ remarks! {
             /// The radius of a round section with the rotary inertia that is assumed.
             radius: f64,
         } = "assumed-rotary-inertia",
+        /// A width in the wind that is that of a blade, and that every vein of it has.
+        #[error(
+            "wind.width is that of each vein: together they turn {} to the wind where the blade is {} wide; without it \
+             each vein has the width of its strip",
+            four_digits(*.together), four_digits(*.blade)
+        )]
+        WiderThanBlade {
+            /// The largest widths of all veins together.
+            together: f64,
+            /// The largest width of the blade.
+            blade: f64,
+        } = "wider-than-blade",
         /// A section with a side longer than its vein.
         #[error(
             "the section of vein {} is {} across, and the vein is {} long: check both numbers and their units",
@@ -309,7 +325,7 @@ pub fn plausibility_warnings(scenario: &Scenario) -> Vec<PlausibilityWarning> {
         denser_than_anything(scenario),
         lighter_than_air(scenario),
         stiffer_than_diamond(scenario),
-        assumed_rotary_inertia(scenario),
+        wider_than_blade(scenario),
     ];
     let all = angles.into_iter().chain(lengths).chain(materials);
     all.flatten().collect()
@@ -326,6 +342,15 @@ pub fn probable_obstacle_to_rest(scenario: &Scenario) -> Option<PlausibilityWarn
         weight_of_another_mass,
     ];
     slips.into_iter().find_map(|slip| slip(scenario))
+}
+
+/// A width in the wind that every vein of a blade has, and that is the blade's.
+fn wider_than_blade(scenario: &Scenario) -> Option<PlausibilityWarning> {
+    let (wind, blade) = (scenario.wind.as_ref()?, scenario.blade.as_ref()?);
+    let together = wind.width.iter().map(Profile::max_abs).sum();
+    let blade = blade.width(blade.widest());
+    (together > PLAUSIBLE.width_in_wind * blade)
+        .then_some(PlausibilityWarning::WiderThanBlade { together, blade })
 }
 
 /// How far a held tip is from the base of a vein.
@@ -411,7 +436,7 @@ fn nearly_upright(scenario: &Scenario) -> Option<PlausibilityWarning> {
 }
 
 /// The rotary inertia that veins without a section have, where masses are real ones.
-fn assumed_rotary_inertia(scenario: &Scenario) -> Option<PlausibilityWarning> {
+pub fn assumed_rotary_inertia(scenario: &Scenario) -> Option<PlausibilityWarning> {
     let given = &scenario.dynamics;
     let assumed = given.polar_inertia == PolarInertia::Same
         && given.density != Dynamics::default_for(&scenario.rods).density;
@@ -725,20 +750,20 @@ mod tests {
                 stiffness = {{ torsion = 0.2, bending_2 = 0.2, bending_3 = 0.2, axial = inf, shear_2 = inf, shear_3 = inf }}
                 dynamics = {{ {dynamics} }}"#
             );
-            plausibility_warnings(&Scenario::from_toml(&text).unwrap())
+            assumed_rotary_inertia(&Scenario::from_toml(&text).unwrap())
         };
         let seconds = ", time = \"s\"";
         let density = "density = 7.5e-7";
-        let [PlausibilityWarning::AssumedRotaryInertia { radius }] = doubts(seconds, density)[..]
+        let Some(PlausibilityWarning::AssumedRotaryInertia { radius }) = doubts(seconds, density)
         else {
             panic!("{:?}", doubts(seconds, density))
         };
         assert!((radius - 2.4).abs() < 1e-12, "{radius}");
         for given in ["section_radius = 0.1", "rotary_inertia = 1e-9"] {
-            assert_eq!(doubts(seconds, &format!("{density}, {given}")), []);
+            assert_eq!(doubts(seconds, &format!("{density}, {given}")), None);
         }
-        assert_eq!(doubts("", density), []);
-        assert_eq!(doubts("", ""), []);
+        assert_eq!(doubts("", density), None);
+        assert_eq!(doubts("", ""), None);
     }
 
     /// Materials in other units than those of the scenario: 0.8 g/cm³ and 500 MPa as they stand, in cm and N.

@@ -225,7 +225,7 @@ impl Entries {
         let shared = held_tip.is_some() || joined && rods.len() > 1;
         let grips = supports::read_grips(self, &rods, shared)?;
         let support_motion = read_support_motion(self)?;
-        let wind = read_wind(self, rods.len())?;
+        let wind = read_wind(self, rods.len(), &source)?;
         let photo = read_photo(self)?;
         let tolerance = read_tolerance(self.value_or_default(Key::Tolerance)?)?;
         let gravity = match &factored {

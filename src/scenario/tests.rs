@@ -275,7 +275,7 @@ fn what_cannot_be_is_refused() {
         wind.velocity=[1e200, 0, 0] => gives |U| T/L
         wind.velocity=[1e6, 0, 0] => gives rho C_D w |U|^2 L^3/(2 A)
         wind.drag=-1 => must not be negative
-        wind.width=0 => must be greater than 0
+        wind.width=-1 => must not be negative
         section.inner_diameter=0.1 => must be less than section.diameter
         section.wall=0.01 => section.wall is given, too: leave one of them out
         section.shape=ellipse => a circle has a diameter

@@ -38,7 +38,7 @@ use crate::motion::{
 use crate::relax;
 use crate::relax::{Equilibrium, EquilibriumTracker, RelaxError, StateOnGrid};
 use crate::run::{Instant, RefusedOption};
-use crate::scenario::{Scenario, plausibility_warnings};
+use crate::scenario::{Scenario, assumed_rotary_inertia, plausibility_warnings};
 pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub(crate) use crate::simulate::comparison::compared_points;
 pub use crate::simulate::comparison::{Frame, OutputSample, ShapeSnapshot};
@@ -203,6 +203,7 @@ impl Simulation {
         method.set_limit(options.limit.clone());
         let MotionTimes { duration, interval } = physics.times();
         let warnings = plausibility_warnings(scenario).into_iter();
+        let warnings = warnings.chain(assumed_rotary_inertia(scenario));
         let simulation = Simulation {
             leaf,
             choice,

@@ -399,3 +399,46 @@ fn wind_and_other_forces_without_a_potential_act_together() {
     assert!(tip(&moved).distance(tip(&grown)) < 3e-8);
     assert_eq!(grown.stable(), Some(true));
 }
+
+/// Veins with sections, and a blade, turn to the wind what they are wide, unless that is given; the scenario that is
+/// written says no more than was said.
+#[test]
+fn the_width_in_wind_is_that_of_sections_and_strips() {
+    let air = "[wind]\nvelocity = [0.0, 150.0, 0.0]\ndensity = 1.2e-8\ndrag = 1.2\n";
+    let strip = format!(
+        "name = 'strip'\nleaf = {{ rods = 1, length = 10, fan = [0] }}\nsection = {{ shape = 'rectangle', \
+         width = {{ at = [0, 1], value = [0.6, 0.2] }}, thickness = 0.02, young = 2e5, mass_density = 8e-6 }}\n{air}"
+    );
+    let given = format!("{strip}width = {{ at = [0, 1], value = [0.6, 0.2] }}\n");
+    let [strip, given] = [strip, given].map(|text| Scenario::from_toml(&text).unwrap());
+    let (own, same) = (
+        rests(&strip, Options::default()),
+        rests(&given, Options::default()),
+    );
+    let away = tip(&own).distance(tip(&same));
+    assert!(away < 1e-9, "{away:e}");
+
+    let blade = format!(
+        "name = 'blade'\nleaf = {{ rods = 5, elevation = 0.9 }}\nblade = {{ length = 25, thickness = 0.03, young = 5e4, \
+         mass_density = 8e-6, width = {{ at = [0, 0.4, 1], value = [0.9, 1.6, 0] }} }}\n{air}"
+    );
+    let blade = Scenario::from_toml(&blade).unwrap();
+    let wind = blade.wind.as_ref().unwrap();
+    let whole = blade.blade.as_ref().unwrap();
+    // Strips of a slender blade are across it but for the square of their small angles.
+    for x in [0.0, 0.2, 0.4, 0.7, 1.0] {
+        let together: f64 = wind.width.iter().map(|width| width.at(x)).sum();
+        close("width of the strips", together, whole.width(x), 4e-3);
+    }
+    for leaf in [&strip, &blade] {
+        let written = serde_json::to_value(leaf).unwrap();
+        assert_eq!(written["wind"].get("width"), None);
+        let again = Scenario::from_toml(&written.to_string()).unwrap();
+        assert_eq!(again.wind, leaf.wind);
+    }
+    // Numbers tell no width.
+    let rod = serde_json::to_string(&in_gusts()).unwrap();
+    let refused = rod.replace("\"width\"", "\"witdh\"");
+    let refused = Scenario::from_toml(&refused).unwrap_err().to_string();
+    assert!(refused.contains("wind.width is missing"), "{refused}");
+}

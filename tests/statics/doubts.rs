@@ -197,6 +197,54 @@ fn an_acceleration_of_a_flat_strip_is_named() {
     assert_eq!(strip(-800.0 * 0.008 * 4e-4 * 9.81), "");
 }
 
+/// Flat veins that turn their edge to the wind, or half of their face, are told; those that face it, and round ones, are
+/// not. A width that every vein of a blade has and that is the blade's is told, too.
+#[test]
+fn faces_that_turn_away_from_the_wind_are_named() {
+    let air =
+        |velocity: &str| format!("[wind]\nvelocity = {velocity}\ndensity = 1.2e-8\ndrag = 1.2\n");
+    let rod = |section: &str, velocity: &str| {
+        let text = format!(
+            "name = 'rod'\nleaf = {{ rods = 1, length = 10, fan = [0] }}\nsection = {{ {section}, young = 2e5 }}\n{}",
+            air(velocity)
+        );
+        Scenario::from_toml(&text).unwrap()
+    };
+    let flat = "shape = 'rectangle', width = 0.6, thickness = 0.06";
+    let round = "shape = 'circle', diameter = 0.1";
+    // The face is normal to z: an edge of a tenth, and at 60 degrees from the face nearly a half.
+    for (section, velocity, part) in [
+        (flat, "[0, 0, 50]", None),
+        (flat, "[0, 50, 0]", Some(0.1)),
+        (flat, "[0, 8.66, 5]", Some((0.75_f64 * 0.01 + 0.25).sqrt())),
+        (round, "[0, 8.66, 5]", None),
+    ] {
+        let doubts = settle(&rod(section, velocity), 1e-6).doubts;
+        let told = doubts.iter().find_map(|doubt| match doubt {
+            EquilibriumDoubt::TurnedFromWind { part } => Some(*part),
+            _ => None,
+        });
+        assert_eq!(
+            told.is_some(),
+            part.is_some(),
+            "{section} {velocity}: {told:?}"
+        );
+        if let (Some(told), Some(part)) = (told, part) {
+            close("part", told, part, 0.01 * part);
+        }
+    }
+    let blade = |width: &str| {
+        let text = format!(
+            "name = 'blade'\nleaf = {{ rods = 3, elevation = 0.9 }}\nblade = {{ length = 25, thickness = 0.03, \
+             young = 5e4, width = {{ at = [0, 0.4, 1], value = [0.9, 1.6, 0.5] }} }}\n{}{width}",
+            air("[0, 0, 1]")
+        );
+        codes(&settle(&Scenario::from_toml(&text).unwrap(), 1e-4).doubts)
+    };
+    assert!(!blade("").contains("wider-than-blade"));
+    assert!(blade("width = 1.6").contains("wider-than-blade"));
+}
+
 /// Nothing is said about the leaves that come with the program, whose numbers are meant.
 #[test]
 fn nothing_is_said_about_other_leaves() {

@@ -116,6 +116,13 @@ fn last_significant_place(error: f64) -> i32 {
     error.max(1e-16).log10().ceil() as i32
 }
 
+/// The place of the last digit of a number that its error leaves; the first digit of one that is larger than its error.
+fn last_place_of(value: f64, error: f64) -> i32 {
+    let place = last_significant_place(error);
+    let is_lost = value.abs() > error && (value / 10f64.powi(place)).round() == 0.0;
+    place - i32::from(is_lost)
+}
+
 /// A number without the digits below its error: zero if it is no larger.
 pub fn round_to_error(value: f64, error: f64) -> f64 {
     if !(error > 0.0 && error.is_finite()) {
@@ -124,7 +131,7 @@ pub fn round_to_error(value: f64, error: f64) -> f64 {
     if value.abs() <= error {
         return 0.0;
     }
-    let unit = 10f64.powi(last_significant_place(error));
+    let unit = 10f64.powi(last_place_of(value, error));
     (value / unit).round() * unit
 }
 
@@ -138,7 +145,7 @@ pub fn format_within_error(value: f64, error: f64) -> String {
     if rounded == 0.0 {
         return "0".into();
     }
-    let (exponent, last) = (rounded_exponent(value, 0), last_significant_place(error));
+    let (exponent, last) = (rounded_exponent(value, 0), last_place_of(value, error));
     match last > 0 || !(-5..16).contains(&exponent) {
         true => format!("{value:.*e}", (exponent - last).max(0) as usize),
         false => format!("{value:.*}", -last as usize),
@@ -338,6 +345,11 @@ mod tests {
         assert_eq!(format_within_error(0.25, 0.0), "0.2500000000000000");
         assert_eq!(format_within_error(0.25, f64::INFINITY), "0.25");
         assert_eq!(format_five_digits(round_to_error(3.1575834, 2e-3)), "3.16");
+        // What is larger than its error keeps its first digit.
+        assert_eq!(round_to_error(429.0, 121.0), 400.0);
+        assert_eq!(format_within_error(429.0, 121.0), "4e2");
+        assert_eq!(format_within_error(-0.429, 0.121), "-0.4");
+        assert_eq!(round_to_error(119.0, 121.0), 0.0);
         assert_eq!(round_to_error(1e-12, 1e-9), 0.0);
         assert_eq!([8.9e-9, 1e-8, 3.0].map(decimals_for_error), [8, 8, 0]);
     }

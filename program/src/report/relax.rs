@@ -6,7 +6,7 @@ use crate::report::document::{
 };
 use crate::report::numbers::{
     ROUNDING_OF_LENGTHS, count_in_words, decimals_for_error, duration_text, format_as_accurate,
-    format_five_digits, format_position, format_within_error, grids_text,
+    format_error_bound, format_five_digits, format_position, format_within_error, grids_text,
     negative_eigenvalues_text, number_in_key_unit, number_in_unit, position_decimals,
     position_error_text, round_to_error, tips_text, upper_bound_text, veins_text,
 };
@@ -284,6 +284,9 @@ fn error_line(equilibrium: &Equilibrium, units: &Units) -> String {
     }
 }
 
+/// The part of the largest stress from which on its error is told beside it.
+const LARGE_STRESS_ERROR: f64 = 0.05;
+
 /// The largest stress in the sections of a leaf at rest.
 fn largest_stress_line(equilibrium: &Equilibrium, units: &Units) -> Option<String> {
     let of = (equilibrium.stress.as_ref()).filter(|_| equilibrium.outcome.is_at_rest())?;
@@ -301,8 +304,18 @@ fn largest_stress_line(equilibrium: &Equilibrium, units: &Units) -> Option<Strin
     let error = of
         .error
         .unwrap_or(FORCE_ERROR_FACTOR * relative * equivalent);
-    let [normal, shear, equivalent] = [normal, shear, equivalent]
-        .map(|it| number_in_unit(format_five_digits(round_to_error(it, error)), units, STRESS));
+    let [normal, shear, rounded] =
+        [normal, shear, equivalent].map(|it| format_five_digits(round_to_error(it, error)));
+    let equivalent = match error > LARGE_STRESS_ERROR * equivalent {
+        true => format!(
+            "{} ± {}",
+            format_two_digits(equivalent),
+            format_error_bound(error)
+        ),
+        false => rounded,
+    };
+    let [normal, shear, equivalent] =
+        [normal, shear, equivalent].map(|it| number_in_unit(it, units, STRESS));
     Some(format!(
         "at most {equivalent} in vein {} {place}: normal {normal}, shear {shear}",
         of.vein

@@ -12,6 +12,7 @@ from ._fit import Asked, Fit
 from ._leaf import Array
 from ._measured import Measured, measurements
 from ._progress import Progress, reporter
+from ._range import Keys, joined
 from ._relax import warn
 from ._scenario import Source, checked
 
@@ -22,7 +23,7 @@ Bounds: TypeAlias = Union[Sequence[float], Array, None]
 def fit(
     scenario: Source,
     data: Measured | Iterable[Measured],
-    free: str | Iterable[str] | Mapping[str, Bounds],
+    free: str | Iterable[Keys] | Mapping[str, Bounds] | Mapping[Keys, Bounds],
     *,
     set: Mapping[str, Any] | None = None,
     robust: bool = False,
@@ -49,7 +50,8 @@ def fit(
         if they are known ``"sigma"``, ``"sd"`` and ``"experiment"``. One number is a column of it; none, and what is
         not a number, is what was not measured.
     free
-        Keys of the numbers that are free; of a list or a profile every entry. With bounds: ``"KEY=LOW..HIGH"``, or a
+        Keys of the numbers that are free; of a list or a profile every entry. Keys joined by ``+``, or in a tuple, take
+        the same value: ``[("stiffness.bending_2", "stiffness.bending_3")]``. With bounds: ``"KEY=LOW..HIGH"``, or a
         dict of a pair ``(low, high)``, or none, for each key. ``"offset:COLUMN"`` is what is added to a column of
         experiments, as for slack: ``"offset:tip.position[0]"``.
     robust
@@ -111,7 +113,8 @@ def fit(
     maps = _columns(columns)
     if isinstance(every, bool) or not isinstance(every, Integral) or not 1 <= every < 2**63:
         raise ValueError(f"every = {every!r}: must be a whole number from 1")
-    keys = [_free(key, free) for key in texts("free", free, "stiffness.axial")]
+    named = _joined(free)
+    keys = [_free(key, named) for key in texts("free", named, "stiffness.axial")]
     chosen = texts("rows", rows, "load.tip_force[0]>0.5") if rows else []
     leaf = checked(scenario, set)
     tables = measurements(data, "data", leaf.units)
@@ -133,6 +136,15 @@ def _columns(columns: Mapping[str, str] | None) -> list[str]:
     if not isinstance(given, Mapping) or not all(isinstance(text, str) for pair in given.items() for text in pair):
         raise TypeError("columns: must be a dict of texts, as in {'Force': 'load.tip_force[0]'}")
     return [f"{name}={quantity}" for name, quantity in given.items()]
+
+
+def _joined(free: Any) -> Any:
+    """The free numbers, those in a tuple as the program names them."""
+    if isinstance(free, Mapping):
+        return {joined(keys, "free"): bounds for keys, bounds in free.items()}
+    if isinstance(free, str) or not isinstance(free, Iterable):
+        return free
+    return [joined(keys, "free") if isinstance(keys, tuple) else keys for keys in free]
 
 
 def _free(number: str, free: str | Iterable[str] | Mapping[str, Bounds]) -> str:

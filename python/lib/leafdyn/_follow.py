@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any, SupportsIndex, overload
 
 from . import _leafdyn
-from ._arguments import numbers, switches, whole
+from ._arguments import numbers, seconds, switches, whole
 from ._branches import Boundary, Trace
 from ._errors import keeping
 from ._progress import Progress, reporter
@@ -27,6 +27,7 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Trace: ...
 
@@ -43,6 +44,7 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Boundary: ...
 
@@ -59,6 +61,7 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Any: ...
 
@@ -74,6 +77,7 @@ def trace(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Trace | Boundary:
     """Follow an equilibrium through one number of its scenario: through folds, with its stability along the way. With
@@ -94,6 +98,8 @@ def trace(
         becomes unstable in one more direction. Of two numbers: of the first trace.
     points
         Most points of a branch, or of a curve to either side.
+    time_limit
+        Seconds after which it ends with what was followed until then; ``remark`` then says that it was stopped.
 
     Returns
     -------
@@ -128,10 +134,10 @@ def trace(
     found: Trace | Boundary
     if len(given) == 2:
         found = _boundary(
-            scenario, given[0], given[1], set, switch, until, keep_unstable, segments, tolerance, points, progress
+            scenario, given[0], given[1], set, switch, until, keep_unstable, segments, tolerance, points, time_limit, progress
         )
     else:
-        leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points)
+        leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points, time_limit)
         with reporter(progress) as heard, keeping(lambda parts: Trace(*parts)):
             found = Trace(*_leafdyn.trace(leaf._core, given[0], asked, heard))
     warn(found.name, found.remark)
@@ -149,6 +155,7 @@ def boundary(
     segments: SupportsIndex | None = None,
     tolerance: float | None = None,
     points: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Boundary:
     """Follow the points at which the stability of a leaf changes through two numbers of its scenario, as curves.
@@ -199,7 +206,9 @@ def boundary(
     both = ranges(vary, lambda: checked(scenario, set).units)
     if isinstance(vary, str) or len(both) != 2:
         raise ValueError(f"vary has {len(both)} number{'s' * (len(both) != 1)}: give two, in a dict or a list")
-    found = _boundary(scenario, both[0], both[1], set, switch, until, keep_unstable, segments, tolerance, points, progress)
+    found = _boundary(
+        scenario, both[0], both[1], set, switch, until, keep_unstable, segments, tolerance, points, time_limit, progress
+    )
     warn(found.name, found.remark)
     return found
 
@@ -215,9 +224,10 @@ def _boundary(
     segments: SupportsIndex | None,
     tolerance: float | None,
     points: SupportsIndex | None,
+    time_limit: float | None,
     progress: Progress,
 ) -> Boundary:
-    leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points)
+    leaf, asked = _followed(scenario, set, switch, until, keep_unstable, segments, tolerance, points, time_limit)
     with reporter(progress) as heard, keeping(lambda parts: Boundary(*parts)):
         return Boundary(*_leafdyn.boundary(leaf._core, along, across, asked, heard))
 
@@ -231,10 +241,12 @@ def _followed(
     segments: SupportsIndex | None,
     tolerance: float | None,
     points: SupportsIndex | None,
+    time_limit: float | None,
 ) -> tuple[Scenario, dict[str, Any]]:
     """A leaf that is about to be followed, and how."""
     whole(segments=segments, points=points)
     numbers(tolerance=tolerance)
+    seconds(time_limit=time_limit)
     switches(switch=switch, keep_unstable=keep_unstable)
     asked = {
         "switch": switch,
@@ -243,5 +255,6 @@ def _followed(
         "segments": segments,
         "tolerance": tolerance,
         "points": points,
+        "time_limit": time_limit,
     }
     return checked(scenario, set), asked

@@ -163,7 +163,12 @@ def check(
     scenario: Scenario, tolerance: float | None, keep_unstable: bool, intervals: SupportsIndex | None, progress: _Heard
 ) -> tuple[Files, Leaf, tuple[_Array, _Array] | None]: ...
 def equilibria(
-    scenario: Scenario, tolerance: float | None, full_model: bool, stations: SupportsIndex | None, progress: _Heard
+    scenario: Scenario,
+    tolerance: float | None,
+    full_model: bool,
+    stations: SupportsIndex | None,
+    time_limit: float | None,
+    progress: _Heard,
 ) -> tuple[Files, list[tuple[Leaf, int, bool]]]: ...
 def trace(
     scenario: Scenario, vary: _Range, asked: Mapping[str, Any], progress: _Heard

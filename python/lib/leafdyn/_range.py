@@ -19,6 +19,9 @@ Range: TypeAlias = Union[
 ]
 """``(low, high)``, ``(low, high, "log")``, ``(low, high, count)``, ``(low, high, count, "log")``, or an array."""
 
+Keys: TypeAlias = Union[str, tuple[str, ...]]
+"""A key, or several that take the same value: joined by ``+``, or in a tuple."""
+
 Vary: TypeAlias = Union[str, Iterable[str], Mapping[str, Range]]
 """Numbers with their ranges: ``"KEY=FROM..TO[:COUNT][log]"``, a list of such texts, or ``{KEY: range}``."""
 
@@ -35,8 +38,20 @@ def ranges(vary: Vary, units: Units = dict) -> list[Given]:
     ['load.gravity[2]=-1.0..-4.0:3']
     """
     if isinstance(vary, Mapping):
-        return [_given(key, plain(span, key, units)) for key, span in vary.items()]
+        return [_given(joined(keys, "vary"), plain(span, joined(keys, "vary"), units)) for keys, span in vary.items()]
     return list(texts("vary", vary, "load.gravity[2]=-1..-2"))
+
+
+def joined(keys: Keys, argument: str) -> str:
+    """Keys that take the same value, as the program names them.
+
+    >>> joined(("coupling.y", "coupling.z"), "vary")
+    'coupling.y+coupling.z'
+    """
+    together = "+".join(keys) if isinstance(keys, tuple) and all(isinstance(key, str) for key in keys) else keys
+    if not isinstance(together, str):
+        raise TypeError(f'{argument}: {keys!r}: must be a key, such as "leaf.rods", or several in a tuple')
+    return together
 
 
 def spans(vary: str | Iterable[str]) -> dict[str, Range]:

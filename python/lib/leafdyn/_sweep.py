@@ -17,7 +17,7 @@ from ._errors import Interrupted, keeping, unknown_key
 from ._leaf import Equilibrium
 from ._progress import Heard, Progress, reporter
 from ._quantities import Units, plain
-from ._range import Range, spans, values
+from ._range import Keys, Range, joined, spans, values
 from ._refused import RefusedLeaf
 from ._relax import asked_for, relaxed, tells_refusals, warn
 from ._scenario import Scenario, Source, checked
@@ -39,9 +39,6 @@ AT_ONCE_WITH_MODES = 200
 
 Values: TypeAlias = Union[Range, Iterable[Any], Mapping[str, Any]]
 """What a key takes one after the other; with labels, a dict of them."""
-
-Keys: TypeAlias = Union[str, tuple[str, ...]]
-"""A key, or several that take the same value: joined by ``+``, or in a tuple."""
 
 
 def sweep(
@@ -241,7 +238,7 @@ class Samples(NamedTuple):
 def _samples(vary: Any, units: Units) -> Samples:
     """Leaves over a grid, or of the rows of a table."""
     if hasattr(vary, "columns") and hasattr(vary, "iloc"):
-        keys = [_joined(key) for key in vary.columns]
+        keys = [joined(key, "vary") for key in vary.columns]
         for key in keys:
             if keys.count(key) > 1:
                 raise ValueError(f"vary: the column {key} is there {keys.count(key)} times: leave all but one out")
@@ -251,12 +248,12 @@ def _samples(vary: Any, units: Units) -> Samples:
     if not isinstance(vary, (str, Mapping)) and isinstance(vary, Iterable):
         vary = list(vary)
         if vary and all(isinstance(row, Mapping) for row in vary):
-            points = [{_joined(key): plain(value, _joined(key), units) for key, value in row.items()} for row in vary]
+            points = [{joined(key, "vary"): plain(value, joined(key, "vary"), units) for key, value in row.items()} for row in vary]
             every = dict.fromkeys(key for point in points for key in point)
             columns = {key: _labels([point.get(key, nan) for point in points]) for key in every}
             return Samples(points, columns, is_table=True)
     given: Mapping[Any, Any] = vary if isinstance(vary, Mapping) else spans(vary)
-    axes = {_joined(keys): _axis(_joined(keys), span, units) for keys, span in given.items()}
+    axes = {joined(keys, "vary"): _axis(joined(keys, "vary"), span, units) for keys, span in given.items()}
     grid = list(product(*axes.values()))
     points = [{key: value for key, (_, value) in zip(axes, point)} for point in grid]
     return Samples(points, {key: [point[at][0] for point in grid] for at, key in enumerate(axes)})
@@ -303,14 +300,6 @@ def _short(value: Any) -> str:
 
 LABEL = 30
 """Letters of an entry in the text of a table."""
-
-
-def _joined(keys: Keys) -> str:
-    """Keys that take the same value, as the program names them."""
-    joined = "+".join(keys) if isinstance(keys, tuple) and all(isinstance(key, str) for key in keys) else keys
-    if not isinstance(joined, str):
-        raise TypeError(f'vary: {keys!r}: must be a key, such as "leaf.rods", or several in a tuple')
-    return joined
 
 
 def _leaves(base: Scenario, samples: Samples, told: bool) -> list[Scenario | RefusedLeaf]:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, SupportsIndex
 
 from . import _leafdyn
-from ._arguments import numbers, switches, text, texts, whole
+from ._arguments import numbers, seconds, switches, text, texts, whole
 from ._errors import keeping
 from ._leaf import Equilibrium
 from ._progress import Progress, reporter
@@ -71,11 +71,12 @@ def equilibria(
     tolerance: float | None = None,
     full_model: bool = False,
     stations: SupportsIndex | None = None,
+    time_limit: float | None = None,
     progress: Progress = None,
 ) -> Equilibria:
     """Look for all equilibria of a leaf, from many starts. Which there are no number of starts can prove.
 
-    Parameters are those of `relax`.
+    Parameters are those of `relax`; after the ``time_limit``, in seconds, it ends with those that it has.
 
     Returns
     -------
@@ -98,6 +99,7 @@ def equilibria(
     """
     whole(stations=stations)
     numbers(tolerance=tolerance)
+    seconds(time_limit=time_limit)
     switches(full_model=full_model)
     leaf = checked(scenario, set)
 
@@ -107,7 +109,7 @@ def equilibria(
         return Equilibria(files, leaves, [starts for _, starts, _ in found], [plain for _, _, plain in found])
 
     with reporter(progress) as heard, keeping(made):
-        return made(_leafdyn.equilibria(leaf._core, tolerance, full_model, stations, heard))
+        return made(_leafdyn.equilibria(leaf._core, tolerance, full_model, stations, time_limit, heard))
 
 
 def stability_map(

@@ -6,11 +6,13 @@ use crate::numbers::{larger, largest};
 use crate::relax::accuracy::richardson::{EXTRAPOLATED_GRIDS, Extrapolated, Richardson};
 use crate::relax::accuracy::transfer::{GridLevel, NodalResultants};
 use crate::relax::accuracy::{FieldErrors, NestedEquilibrium};
+use crate::relax::remark::EquilibriumDoubt;
 use crate::rod::Wrench;
 use crate::scenario::{Grip, Moduli, Scenario, Stress, SupportKind};
 use crate::shape::{RodShape, STATION_TOLERANCE};
 use glam::DVec3;
 use serde::Serialize;
+use std::ops::RangeInclusive;
 
 /// Rounding error of a strain, per segment of a rod.
 const STRAIN_ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -650,4 +652,32 @@ impl Stresses {
             ..self
         }
     }
+}
+/// Parts of the width of the drag that flat sections may turn to the wind before that is doubtful.
+const FACES_IN_WIND: RangeInclusive<f64> = 0.75..=1.33;
+
+/// The doubt about the drag on sections that turn another width to the wind than `wind.width`. What a section turns to
+/// the part of the velocity that is normal to the vein is that of an ellipse with its width and thickness.
+pub(super) fn turned_from_wind(
+    scenario: &Scenario,
+    rods: &[RodShape],
+    stations: &[f64],
+) -> Option<EquilibriumDoubt> {
+    let (wind, widths) = (scenario.wind.as_ref()?, scenario.vein_widths()?);
+    let air = DVec3::from_array(wind.velocity.at(0.0));
+    let (mut turned, mut assumed) = (0.0, 0.0);
+    for (vein, (rod, width)) in rods.iter().zip(&widths).enumerate() {
+        for (nodes, ends) in rod.nodes.windows(2).zip(stations.windows(2)) {
+            let sigma = 0.5 * (ends[0] + ends[1]);
+            let middle = nodes[0].rotation.lerp(nodes[1].rotation, 0.5).normalize();
+            let across = (middle.inverse() * air).with_x(0.0);
+            let thickness = scenario.thickness(vein, sigma)?;
+            let part = rod.length * (ends[1] - ends[0]) * across.length();
+            turned += part * (width.at(sigma) * across.z).hypot(thickness * across.y);
+            assumed += part * wind.width[vein].at(sigma) * across.length();
+        }
+    }
+    let part = turned / assumed;
+    (part.is_finite() && !FACES_IN_WIND.contains(&part))
+        .then_some(EquilibriumDoubt::TurnedFromWind { part })
 }

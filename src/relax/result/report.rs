@@ -13,7 +13,7 @@ use crate::relax::accuracy::{IntegratedLeaf, NestedEquilibrium, transfer};
 use crate::relax::path::{Event, Path, PathPosition, StabilityLoss, Stage};
 use crate::relax::plan::RelaxationProblem;
 use crate::relax::remark::{EquilibriumDoubt, EquilibriumRemark, RestObstacle, SpanHolder};
-use crate::relax::result::forces::Stresses;
+use crate::relax::result::forces::{Stresses, turned_from_wind};
 use crate::relax::result::{Accuracy, BladeReport, Equilibrium, Model, Outcome, Shape, Stability};
 use crate::rotation::{Pose, align_quaternion_sign};
 use crate::scenario::{
@@ -513,6 +513,7 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<Eq
         let strained = || stretch_doubt(scenario, rods, stations);
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
+    all.extend(turned_from_wind(scenario, rods, stations));
     let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
     let shift = scenario.place_shift * longest;
     all.extend(EquilibriumDoubt::about_places(

@@ -30,6 +30,8 @@ pub(in crate::scenario) enum BladeProperty {
     /// Squared radii of gyration of a strip about d2 and d3, by index: t^2/12 by which it resists that its face turns, and
     /// l^2/12 with the lever of bending in the plane, with which the whole blade has the inertia of its width.
     SquaredGyration(usize),
+    /// Width of a strip, across the vein.
+    Width,
     /// k2 of tissue.
     Across,
     /// c1 of tissue.
@@ -45,12 +47,13 @@ impl From<Property> for BladeProperty {
             Property::Force(axis) => BladeProperty::Force(axis),
             Property::Density => BladeProperty::Density,
             Property::SquaredGyration(axis) => BladeProperty::SquaredGyration(axis),
+            Property::Width => BladeProperty::Width,
         }
     }
 }
 
 /// Properties of a vein; tissue has fewer.
-const MAX_PROPERTIES: usize = 12;
+const MAX_PROPERTIES: usize = 13;
 
 /// The indices of A1 to A3 and H1 to H3 among the properties of a vein.
 const STIFFNESSES: Range<usize> = 0..6;
@@ -69,6 +72,7 @@ impl BladeProperty {
             BladeProperty::Rest(axis) => REST_CURVATURES.start + axis,
             BladeProperty::Density => DENSITY,
             BladeProperty::SquaredGyration(axis) => DENSITY + 1 + axis,
+            BladeProperty::Width => DENSITY + 3,
             BladeProperty::Across => 0,
             BladeProperty::Fold => 1,
             BladeProperty::Contraction => 2,
@@ -315,16 +319,16 @@ impl BladeVein {
         [a1, a2, a3, young * h * t, h2, h3]
     }
 
-    /// The mass per length and its squared radii of gyration about d2 and d3, of the blade's own width: also where
-    /// stiffnesses follow from a larger one.
-    fn mass_and_gyration(&self, sigma: f64, material: &LocalMaterial) -> [f64; 3] {
+    /// The mass per length, its squared radii of gyration about d2 and d3, and the width of the strip, of the blade's
+    /// own width: also where stiffnesses follow from a larger one.
+    fn mass_and_extent(&self, sigma: f64, material: &LocalMaterial) -> [f64; 4] {
         let x = self.blade_fraction(sigma);
         let [width, ..] = self.outline.width.value_and_derivatives(x);
         let [h, lever] = self.strip_size(width.max(0.0), x);
         let density = self.material.mass_density.as_ref();
         let density = density.map_or(0.0, |it| it.at(sigma));
         let t = material.t;
-        [density * h * t, t * t / 12.0, lever * lever / 12.0]
+        [density * h * t, t * t / 12.0, lever * lever / 12.0, h]
     }
 
     /// The property with this index at a fraction of the vein's length, without the others.
@@ -339,7 +343,7 @@ impl BladeVein {
                 self.rest_curvature(self.blade_fraction(sigma))[axis]
             }
             index => {
-                self.mass_and_gyration(sigma, &self.material.local_material(sigma))[index - DENSITY]
+                self.mass_and_extent(sigma, &self.material.local_material(sigma))[index - DENSITY]
             }
         }
     }
@@ -350,7 +354,7 @@ impl BladeVein {
         let mut all = [0.0; MAX_PROPERTIES];
         all[STIFFNESSES].copy_from_slice(&self.stiffnesses(sigma, &material));
         all[REST_CURVATURES].copy_from_slice(&self.rest_curvature(self.blade_fraction(sigma)));
-        all[DENSITY..].copy_from_slice(&self.mass_and_gyration(sigma, &material));
+        all[DENSITY..].copy_from_slice(&self.mass_and_extent(sigma, &material));
         all
     }
 }

@@ -251,8 +251,8 @@ keys! {
     WindDensity "wind.density": Number(Positive), [-4, 1, 2], Required("1.2");
     /// C_D, the drag coefficient of the rods.
     WindDrag "wind.drag": Number(NotNegative), [0, 0, 0], Required("2.0");
-    /// width that a rod turns to the wind.
-    WindWidth "wind.width": Quantity(Positive), [1, 0, 0], Required("0.01");
+    /// width that a vein turns to the wind; left out: that of its section, or of its strip of a blade.
+    WindWidth "wind.width": Quantity(NotNegative), [1, 0, 0], Derived;
     /// length that a pixel of a photograph shows.
     PhotoScale "photo.scale": Number(Positive), [1, 0, 0], Required("0.01");
     /// pixels from the left edge of a photograph to the origin of the scenario.

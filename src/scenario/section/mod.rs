@@ -197,11 +197,13 @@ pub(super) enum Property {
     Density,
     /// Squared radii of gyration about d2 and d3, by index: rotary inertia per mass.
     SquaredGyration(usize),
+    /// Width along d2.
+    Width,
 }
 
 impl Property {
-    const ALL: [Property; 9] = {
-        use Property::{Couple, Density, Force, SquaredGyration};
+    const ALL: [Property; 10] = {
+        use Property::{Couple, Density, Force, SquaredGyration, Width};
         [
             Couple(0),
             Couple(1),
@@ -212,6 +214,7 @@ impl Property {
             Density,
             SquaredGyration(0),
             SquaredGyration(1),
+            Width,
         ]
     };
 
@@ -222,6 +225,7 @@ impl Property {
             Property::Force(axis) => 3 + axis,
             Property::Density => 6,
             Property::SquaredGyration(axis) => 7 + axis,
+            Property::Width => 9,
         }
     }
 }
@@ -412,6 +416,7 @@ impl Section {
             Property::Force(axis) => self.shear_factors_at(place)[axis - 1] * shear * area,
             Property::Density => self.mass_density.at(place) * area,
             Property::SquaredGyration(axis) => second[axis] / area,
+            Property::Width => self.width.at(place),
         }
     }
 
