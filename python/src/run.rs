@@ -24,9 +24,26 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 /// Interval between checks for signals and progress.
 const POLL_INTERVAL: Duration = Duration::from_millis(10);
 
-/// How long a run that Ctrl-C ends may take to hand over what it has found, unless a second Ctrl-C ends that, too: of
-/// minutes of work the last points are still to be brought to their accuracy.
-const PATIENCE: Duration = Duration::from_secs(5);
+/// How long a run that Ctrl-C ends may take to hand over what it has found, unless a second Ctrl-C ends that, too.
+struct Patience {
+    least: Duration,
+    /// Part of the time that the run has taken: more is lost if it is not waited for.
+    part: f64,
+    most: Duration,
+}
+
+const PATIENCE: Patience = Patience {
+    least: Duration::from_millis(120),
+    part: 0.1,
+    most: Duration::from_secs(10),
+};
+
+impl Patience {
+    /// With a run that has taken so long.
+    fn with(&self, run: Duration) -> Duration {
+        run.mul_f64(self.part).clamp(self.least, self.most)
+    }
+}
 
 /// Most threads that can be requested.
 const MOST_THREADS: usize = 1024;
@@ -314,6 +331,7 @@ pub fn run_keeping<T: Send + 'static>(
     interrupt: &mut Interrupt,
     work: impl FnOnce(&Monitor) -> T + Send + 'static,
 ) -> PyResult<T> {
+    let begun = Instant::now();
     let (stop, mut result) = match wait_for(py, progress, work)? {
         Waited::Ended(found) => return Ok(found),
         Waited::Stopped(stop, result) => (stop, result),
@@ -321,8 +339,8 @@ pub fn run_keeping<T: Send + 'static>(
     if !is_interrupt(py, &stop) {
         return Err(stop);
     }
-    let clock = Instant::now();
-    while clock.elapsed() < PATIENCE {
+    let (clock, patience) = (Instant::now(), PATIENCE.with(begun.elapsed()));
+    while clock.elapsed() < patience {
         let received;
         (received, result) = py.detach(move || (result.recv_timeout(POLL_INTERVAL), result));
         match received {

@@ -143,6 +143,18 @@ def test_refusals(data: Any, free: Any, part: str) -> None:
     assert "--" not in str(refused.value)
 
 
+def test_keys_in_a_tuple_take_the_same_value() -> None:
+    known = {key: value for key, value in REST.items() if key not in ("stiffness.shear_2", "stiffness.shear_3")}
+    shear = ("stiffness.shear_2", "stiffness.shear_3")
+    together = leafdyn.fit(PULL, measured("pull.csv"), [AXIAL, shear], set=known)
+    assert list(together.parameters) == [AXIAL, "+".join(shear)]
+    assert numbers(together) == numbers(leafdyn.fit(PULL, measured("pull.csv"), [AXIAL, "+".join(shear)], set=known))
+    bound = leafdyn.fit(PULL, measured("pull.csv"), {AXIAL: None, shear: (1.0, 1e4)}, set=known)
+    assert list(bound.parameters) == list(together.parameters)
+    with pytest.raises(TypeError, match=r"free: \(3, 4\): must be a key"):
+        leafdyn.fit(PULL, measured("pull.csv"), [(3, 4)], set=known)
+
+
 def test_what_is_no_table() -> None:
     with pytest.raises(TypeError, match="data\\[0\\]: allowed are a path, a dict of columns"):
         leafdyn.fit(PULL, [1.0, 2.0], AXIAL)  # type: ignore[list-item]

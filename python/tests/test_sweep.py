@@ -390,3 +390,11 @@ def test_a_limit_of_time() -> None:
         leafdyn.modes(fan(2), time_limit=0)
     with pytest.warns(leafdyn.LeafWarning, match="the time allowed was over"):
         assert leafdyn.sensitivities(fan(2), "leaf.length", time_limit=1e-9).outcome == "out-of-time"
+    vary = {"load.gravity[2]": (-1.0, -2.0)}
+    assert leafdyn.trace(fan(2), vary, time_limit=1e9).complete
+    with pytest.warns(leafdyn.LeafWarning):
+        assert not leafdyn.trace(fan(2), vary, time_limit=1e-9).complete
+    assert len(leafdyn.equilibria(fan(2), time_limit=1e9)) == 1
+    for verb in (leafdyn.trace, leafdyn.boundary):
+        with pytest.raises(ValueError, match="time_limit = -1"):
+            verb(fan(2), {**vary, "coupling.y": (1.0, 2.0)}, time_limit=-1)

@@ -53,7 +53,7 @@ remarks! {
     /// in the scenario.
     pub enum BranchRemark {
         /// As many points as are allowed.
-        #[error("there are more points: allow more")]
+        #[error("there are more points: allow more, or end the branch where it becomes unstable")]
         MorePoints = "more-points",
         /// No point within the shortest step.
         #[error("{0}")]
