@@ -15,6 +15,7 @@ use crate::branch::points::{
 use crate::leaf::dot;
 use crate::leaf::{NodalField, State};
 use crate::numbers::larger;
+use crate::words;
 
 /// Additional modes in the border: others may be nearly neutral.
 const EXTRA_BORDER_MODES: usize = 2;
@@ -65,6 +66,26 @@ pub enum CriticalKind {
     /// Other branches cross the branch.
     Branching,
 }
+
+words! {
+    /// On which side of a branch point, along a branch that loses its stability there, the branches that cross lie
+    /// (Golubitsky and Schaeffer, Singularities and Groups in Bifurcation Theory I, 1985).
+    pub enum BranchingKind {
+        /// Beyond it: they leave steadily, and are stable where they leave a stable branch.
+        Supercritical = "supercritical",
+        /// Before it: they are unstable there, and the leaf jumps.
+        Subcritical = "subcritical",
+        /// One on either side.
+        Transcritical = "transcritical",
+    }
+}
+
+/// Distances (arclength) from a branch point at which the branches that cross there tell on which side they lie: of the
+/// second twice as far, even parts are four times, odd ones twice as large.
+const BRANCHING_DISTANCES: [f64; 2] = [0.01, 0.02];
+
+/// By how much the ratio of both parts may differ from four and from two, as a factor.
+const BRANCHING_RATIO_TOLERANCE: f64 = 1.5;
 
 /// A point of a branch at which the matrix is singular.
 #[derive(Clone, Debug)]
@@ -376,6 +397,40 @@ impl CriticalPoint {
         let state =
             equations.state_after_increments(&self.state, [fraction], &to.increments, distance)?;
         equations.correct(&state, fraction, Some(to))
+    }
+
+    /// On which side the branches lie that cross here, where one mode becomes unstable, or stable, along the branch;
+    /// `None` where that is not to be seen near the point.
+    pub fn branching_kind(&self, equations: &mut BranchEquations) -> Option<BranchingKind> {
+        if self.kind != CriticalKind::Branching || self.modes.len() != 1 || self.is_vertex() {
+            return None;
+        }
+        let direction = self.branching_direction(equations);
+        let mut shift_at = |direction: &BranchDirection, distance: f64| -> Option<f64> {
+            let point = self.equilibrium_along_direction(equations, direction, distance);
+            Some(point.ok()?.fraction - self.fraction)
+        };
+        // The parameter is c1 a + c2 a^2 + ... away at the distance a, to either side.
+        let (mut even, mut odd) = ([0.0; 2], [0.0; 2]);
+        for (k, distance) in BRANCHING_DISTANCES.into_iter().enumerate() {
+            let ahead = shift_at(&direction, distance)?;
+            let back = shift_at(&direction.reversed(), distance)?;
+            (even[k], odd[k]) = (0.5 * (ahead + back), 0.5 * (ahead - back));
+        }
+        let grows = |parts: [f64; 2], by: f64| {
+            let ratio = parts[1] / parts[0] / by;
+            ratio < BRANCHING_RATIO_TOLERANCE && ratio > BRANCHING_RATIO_TOLERANCE.recip()
+        };
+        let to_unstable_side = match self.indices[1] > self.indices[0] {
+            true => self.tangent.params[0],
+            false => -self.tangent.params[0],
+        };
+        match odd[0].abs() > even[0].abs() {
+            true => grows(odd, 2.0).then_some(BranchingKind::Transcritical),
+            false if !grows(even, 4.0) => None,
+            false if even[0] * to_unstable_side > 0.0 => Some(BranchingKind::Supercritical),
+            false => Some(BranchingKind::Subcritical),
+        }
     }
 
     /// Derivative of the eigenvalue with respect to the parameter; infinite at a fold, where the

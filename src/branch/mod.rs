@@ -46,7 +46,7 @@ mod verified_branch;
 
 pub use crate::branch::continuation::{BranchEnd, ContinuationOptions, follow_branch};
 pub use crate::branch::convergence::{ExtrapolatedPoint, VerificationFailure};
-pub use crate::branch::critical::{CriticalKind, CriticalPoint};
+pub use crate::branch::critical::{BranchingKind, CriticalKind, CriticalPoint};
 pub use crate::branch::equations::{BranchEquations, CorrectorFailure};
 pub use crate::branch::family::{LeafFamily, ParameterRange, value_at_fraction};
 pub(crate) use crate::branch::motion_branch::{

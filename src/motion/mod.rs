@@ -183,6 +183,8 @@ pub struct Impact {
     pub point: usize,
     /// When it landed.
     pub time: f64,
+    /// The kinetic energy of the mass before it landed.
+    pub kinetic_energy: f64,
     /// The energy that was lost: of the mass and of the point, with one velocity afterwards.
     pub lost_energy: f64,
 }

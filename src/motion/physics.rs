@@ -204,6 +204,13 @@ pub struct LandingMass {
     factor: usize,
 }
 
+impl LandingMass {
+    /// Its kinetic energy before it lands.
+    pub fn kinetic_energy(&self) -> f64 {
+        0.5 * self.mass * self.velocity.length_squared()
+    }
+}
+
 /// Duration of a motion and the interval between its outputs.
 #[derive(Clone, Copy, Debug)]
 pub struct MotionTimes {

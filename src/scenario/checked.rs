@@ -304,6 +304,22 @@ impl Scenario {
         self.couple = loads.couple;
     }
 
+    /// The keys that make rods rigid, with their value, as in `stiffness.axial, stiffness.shear_2 = inf`; empty if
+    /// none is.
+    pub(crate) fn rigid_keys_text(&self) -> String {
+        let is_rigid = |direction: usize| {
+            let mut rods = self.rods.iter();
+            rods.any(|rod| rod.force_stiffness[direction].max_abs().is_infinite())
+        };
+        let keys = [Key::Axial, Key::Shear2, Key::Shear3];
+        let rigid = (0..3).filter(|&direction| is_rigid(direction));
+        let rigid: Vec<&str> = rigid.map(|direction| keys[direction].path()).collect();
+        match rigid.is_empty() {
+            true => String::new(),
+            false => format!("{} = inf", rigid.join(", ")),
+        }
+    }
+
     /// The key, or the table, of something that acts on single veins or on each of them, so that the
     /// leaf with another number of veins is another one: loads per vein, points, grips, couplings
     /// and wind. `None` where all follows from a blade as a whole.

@@ -158,6 +158,13 @@ impl Frame {
             .collect()
     }
 
+    /// The speed of the fastest tip.
+    pub fn tip_speed(&self) -> f64 {
+        let rods = self.velocities.chunks(self.velocities.len() / self.rods);
+        let tips = rods.filter_map(|rod| rod.last());
+        largest(tips.map(|tip| tip.linear.length()))
+    }
+
     /// The shared tip alone, or one tip per rod.
     pub fn tips(&self, joined: bool) -> Vec<DVec3> {
         let ends = self.positions.chunks(self.positions.len() / self.rods);

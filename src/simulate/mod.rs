@@ -20,6 +20,7 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod cheaper;
 mod choice;
 mod comparison;
 mod record;
@@ -38,19 +39,19 @@ use crate::motion::{
 use crate::relax;
 use crate::relax::{Equilibrium, EquilibriumTracker, RelaxError, StateOnGrid};
 use crate::run::{Instant, RefusedOption};
-use crate::scenario::{Scenario, assumed_rotary_inertia, plausibility_warnings};
+use crate::scenario::{MotionStart, Scenario, assumed_rotary_inertia, plausibility_warnings};
 pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub(crate) use crate::simulate::comparison::compared_points;
 pub use crate::simulate::comparison::{Frame, OutputSample, ShapeSnapshot};
 use crate::simulate::comparison::{MotionComparison, Trajectory};
 pub use crate::simulate::record::{LandingRecord, Record, film_indices, snapshot_indices};
 pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
-pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
+pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark, cheaper_text};
 pub(crate) use crate::simulate::request::DEFAULT_MOTION_SEGMENTS;
 pub use crate::simulate::request::{
     DEFAULT_TIP_ERROR, MAX_SIMULATION_SECONDS, Options, Scheme, SimulationError,
 };
-use crate::simulate::start::{start_state, unstable_start_doubt};
+use crate::simulate::start::{motion_start, start_state, unstable_start_doubt};
 use std::time::Duration;
 
 /// The simulation of a leaf in time.
@@ -60,6 +61,10 @@ pub struct Simulation {
     physics: Physics,
     choice: SchemeChoice,
     doubts: Vec<MotionDoubt>,
+    /// What the motion starts from; `None`: a shape that was given.
+    start: Option<MotionStart>,
+    /// Speed of the fastest tip at the last output.
+    tip_speed: f64,
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn TimeIntegrator + Send>,
@@ -86,10 +91,23 @@ impl Simulation {
     /// The leaf at time 0. Where it starts at rest and does not come to rest on the usual grid, it moves on the coarsest
     /// one on which it does.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, SimulationError> {
+        let local_error = options.tolerance.unwrap_or(scenario.tolerance);
+        Simulation::with_local_error(scenario, options, local_error)
+    }
+
+    /// As [`Simulation::new`], with this local error of semi-implicit steps; the start is as accurate as there.
+    fn with_local_error(
+        scenario: &Scenario,
+        options: &Options,
+        local_error: f64,
+    ) -> Result<Self, SimulationError> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let from =
             |leaf: &Leaf, grid: &Grid| start_state(leaf, grid, tolerance, options.limit.clone());
-        let mut on_grid = options.clone();
+        let mut on_grid = Options {
+            tolerance: Some(local_error),
+            ..options.clone()
+        };
         loop {
             match Simulation::with_initial_state(scenario, &on_grid, &from) {
                 Err(SimulationError::NoRest { segments, .. })
@@ -110,7 +128,11 @@ impl Simulation {
         options: &Options,
     ) -> Result<Self, SimulationError> {
         let from = |leaf: &Leaf, grid: &Grid| Ok(follower.state_on(leaf, grid));
-        Simulation::with_initial_state(scenario, options, &from)
+        let begun = Simulation::with_initial_state(scenario, options, &from)?;
+        Ok(Simulation {
+            start: None,
+            ..begun
+        })
     }
 
     /// Brings the leaf from where it is now to rest under this scenario, with which the
@@ -205,6 +227,8 @@ impl Simulation {
         let warnings = plausibility_warnings(scenario).into_iter();
         let warnings = warnings.chain(assumed_rotary_inertia(scenario));
         let simulation = Simulation {
+            start: Some(motion_start(&leaf)),
+            tip_speed: 0.0,
             leaf,
             choice,
             doubts: doubt
@@ -379,6 +403,16 @@ impl Simulation {
         self.grid.sigma()
     }
 
+    /// What the motion starts from; `None` if that is a shape that was given.
+    pub fn start(&self) -> Option<MotionStart> {
+        self.start
+    }
+
+    /// Speed of the fastest tip at the last output.
+    pub fn tip_speed(&self) -> f64 {
+        self.tip_speed
+    }
+
     /// The longest time step, in the scenario's unit; `None` if the error
     /// determines the steps.
     pub fn longest_step(&self) -> Option<f64> {
@@ -420,6 +454,7 @@ impl Simulation {
             vein: scenario.points[impact.point].vein + 1,
             at: scenario.points[impact.point].at,
             time: impact.time * self.physics.time_unit,
+            kinetic_energy: impact.kinetic_energy * self.leaf.scale.moment(),
             lost_energy: impact.lost_energy * self.leaf.scale.moment(),
         };
         self.method.impacts().iter().map(record).collect()
@@ -466,6 +501,7 @@ impl Simulation {
             });
         self.moving += clock.elapsed();
         frame.map(|mut frame| {
+            self.tip_speed = frame.tip_speed();
             self.compare_frame(&mut frame);
             frame
         })
@@ -498,7 +534,9 @@ fn explicit_motion(
     let method =
         Explicit::new(leaf.clone(), physics.clone(), state, own).map_err(
             |obstacle| match obstacle {
-                ExplicitRefusal::RigidRod => SimulationError::Rigid,
+                ExplicitRefusal::RigidRod => SimulationError::Rigid {
+                    keys: leaf.leaf.scenario().rigid_keys_text(),
+                },
                 ExplicitRefusal::MassOffAxis => SimulationError::MassOffAxis,
             },
         )?;

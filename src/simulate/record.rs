@@ -2,7 +2,9 @@
 //! pictures or a film.
 
 use crate::motion::{Energy, StableStep};
+use crate::numbers::{larger, largest};
 use crate::scenario;
+use crate::scenario::MotionStart;
 use crate::shape::serialize_tips;
 use crate::simulate::comparison::{OutputSample, ROUNDING, ShapeSnapshot};
 use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark};
@@ -33,6 +35,9 @@ pub struct Record {
     pub doubts: Vec<MotionDoubt>,
     /// Why it has this method.
     pub choice: SchemeChoice,
+    /// What the motion starts from; `None`: a shape that was given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start: Option<MotionStart>,
     /// Number of rods.
     pub rods: usize,
     /// Whether the tips share one point.
@@ -77,6 +82,8 @@ pub struct Record {
     /// The shared tip at the last output, or the tips of all rods.
     #[serde(flatten, serialize_with = "serialize_tips")]
     pub tips: Vec<DVec3>,
+    /// The speed of the fastest tip at the last output.
+    pub tip_speed: f64,
     /// Fractions of the length at which these shapes have nodes.
     #[serde(skip)]
     pub stations: Vec<f64>,
@@ -101,6 +108,8 @@ pub struct LandingRecord {
     pub at: f64,
     /// When the mass landed.
     pub time: f64,
+    /// The kinetic energy that the mass brought.
+    pub kinetic_energy: f64,
     /// The energy that was lost, which is part of the dissipated energy: that of the mass and the node on which it
     /// landed less that of both with one velocity. It vanishes with the length of the segments.
     pub lost_energy: f64,
@@ -127,6 +136,7 @@ impl Record {
             },
             doubts: simulation.doubts().to_vec(),
             choice: simulation.choice(),
+            start: simulation.start(),
             rods: scenario.rods.len(),
             joined: scenario.joined,
             length: scenario::longest(&scenario.rods),
@@ -149,6 +159,7 @@ impl Record {
                 true => tips.take(1).collect(),
                 false => tips.collect(),
             },
+            tip_speed: simulation.tip_speed() + 0.0,
             stations: simulation.stations().to_vec(),
             stills,
             film: Vec::new(),
@@ -161,12 +172,37 @@ impl Record {
         outcome(&self.stopped)
     }
 
+    /// The largest distance of the tip, or of the mean of free ones, from where it is at the last output, within
+    /// the last tenth of the time that was followed.
+    pub fn late_tip_motion(&self) -> f64 {
+        let Some(last) = self.moments.last() else {
+            return 0.0;
+        };
+        let from = (1.0 - LATE_PART) * last.time;
+        let late = self.moments.iter().filter(|moment| moment.time >= from);
+        largest(late.map(|moment| moment.tip.distance(last.tip)))
+    }
+
+    /// Whether the leaf still moves at the end: within a tenth of the time by more than the error of its tips, or,
+    /// where that is not known, than a thousandth of its length.
+    pub fn moves_at_end(&self) -> bool {
+        let negligible = self.error_estimate.unwrap_or(0.0);
+        let negligible = larger(negligible, NEGLIGIBLE_TIP_MOTION * self.length);
+        larger(
+            self.late_tip_motion(),
+            LATE_PART * self.time * self.tip_speed,
+        ) > negligible
+    }
+
     /// Why the motion ended early, or what makes it doubtful.
     pub fn remark(&self) -> Option<MotionRemark> {
         let imbalance = self.imbalance.map(MotionRemark::Imbalance);
         self.stopped.map(MotionRemark::Stopped).or(imbalance)
     }
 }
+
+/// The part of a motion at its end from which it is told whether the leaf still moves.
+const LATE_PART: f64 = 0.1;
 
 fn outcome(stopped: &Option<Stopped>) -> &'static str {
     stopped.map_or("completed", Stopped::word)

@@ -4,6 +4,7 @@ use crate::motion::Stopped;
 use crate::numbers::format_two_digits;
 use crate::run::remarks;
 use crate::scenario::PlausibilityWarning;
+use crate::simulate::cheaper::CheaperMotion;
 use serde::{Serialize, Serializer};
 
 remarks! {
@@ -36,6 +37,12 @@ remarks! {
             /// The time in which a deviation grows by e.
             growth_time: f64,
         } = "unstable-start",
+        /// A motion that was stopped and would have cost much less otherwise.
+        #[error("the motion takes long; less would be taken with {}", cheaper_text(.cheaper))]
+        Costly {
+            /// What would have made it cost less, the cheapest change first.
+            cheaper: Vec<CheaperMotion>,
+        } = "costly",
         /// Tips that are less accurate than they were to be.
         #[error(
             "the error of the tips may be {}, and {} was aimed at: {}",
@@ -74,6 +81,12 @@ remarks! {
             why: Option<String>,
         } = "not-compared",
     }
+}
+
+/// Changes that make a motion cost less, as one phrase.
+pub fn cheaper_text(cheaper: &[CheaperMotion]) -> String {
+    let all: Vec<String> = cheaper.iter().map(ToString::to_string).collect();
+    all.join("; or with ")
 }
 
 /// The largest deviation of the energy balance of a motion from that at its start, as a part of

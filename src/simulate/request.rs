@@ -50,10 +50,13 @@ pub(super) const DAY: f64 = 86_400.0;
 pub enum SimulationError {
     /// The explicit method has no stable time step.
     #[error(
-        "the explicit method has no stable time step for rigid rods (a stiffness is inf): \
-         use the semi-implicit method, or give a number"
+        "{keys}: the explicit method has no stable time step for rigid rods: use the semi-implicit method, or give \
+         numbers"
     )]
-    Rigid,
+    Rigid {
+        /// The keys that make rods rigid, with their value.
+        keys: String,
+    },
     /// The explicit method does not move masses off the axis.
     #[error(
         "load.point.offset: the explicit method does not move masses off the axis: use the semi-implicit method, or \

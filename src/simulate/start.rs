@@ -28,12 +28,18 @@ pub(crate) fn start_state(
     tolerance: f64,
     limit: Limit,
 ) -> Result<State, SimulationError> {
-    match leaf.scenario().dynamics.start {
-        MotionStart::Released if !leaf.has_placed_supports() => {
-            Ok(released_state(&DiscreteLeaf::new(leaf, grid.clone())))
-        }
-        // Held tips and grips are moved to their positions by the relaxation.
-        MotionStart::Released | MotionStart::AtRest => state_at_rest(leaf, grid, tolerance, limit),
+    match motion_start(leaf) {
+        MotionStart::Released => Ok(released_state(&DiscreteLeaf::new(leaf, grid.clone()))),
+        MotionStart::AtRest => state_at_rest(leaf, grid, tolerance, limit),
+    }
+}
+
+/// From what the motion of a leaf starts: held tips and grips are moved to their positions by the relaxation,
+/// whatever the scenario says.
+pub(crate) fn motion_start(leaf: &Leaf) -> MotionStart {
+    match leaf.has_placed_supports() {
+        true => MotionStart::AtRest,
+        false => leaf.scenario().dynamics.start,
     }
 }
 

@@ -17,6 +17,7 @@ mod trace;
 mod unbend;
 pub(crate) mod vary;
 
+pub use crate::branch::BranchingKind;
 pub use crate::branch::{BranchEnd, CorrectorFailure, CriticalKind, VerificationFailure};
 pub use crate::run::UnknownWord;
 pub use crate::shooting::{NeutralDirection, ShootingSolution};

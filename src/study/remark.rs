@@ -80,6 +80,17 @@ remarks! {
             /// The number that varies, there.
             value: String,
         } = "crossing-not-followed",
+        /// A branch point at which several modes become neutral together.
+        #[error(
+            "at {value} branches cross in {directions} directions, of which one is followed, to both its sides: of a \
+             symmetric leaf the others are its copies, and where nothing ties the veins each buckles for itself: follow one vein"
+        )]
+        OneDirectionFollowed {
+            /// The number that varies, there.
+            value: String,
+            /// The number of modes.
+            directions: usize,
+        } = "one-direction-followed",
         /// Without a potential, a change of stability whose place is not found.
         #[error(
             "beyond {value} stability changes where no grid tells: follow it in smaller steps, or on other segments"

@@ -69,9 +69,11 @@ pub enum LoadKind {
     Moment,
     /// A dead moment per length.
     Couple,
+    /// A mass that has landed, which is drawn as a ball.
+    Mass,
 }
 
-/// A dead load at a point of a vein, which is drawn as an arrow.
+/// A dead load at a point of a vein, which is drawn as an arrow, or a mass.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LoadMark {
     pub action: LoadKind,
@@ -82,7 +84,7 @@ pub struct LoadMark {
     /// Where a force acts off the axis, lengths along d2 and d3.
     #[serde(skip_serializing_if = "is_on_axis")]
     pub offset: [f64; 2],
-    /// Unit vector of a force, or about which a moment turns.
+    /// Unit vector of a force, or about which a moment turns; of a mass none that counts.
     pub direction: DVec3,
     /// In the scenario's units.
     pub size: f64,
@@ -216,8 +218,20 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
         } else {
             DVec3::from_array(it.force)
         };
-        (it.vein + 1, it.at, it.offset, given + it.mass * g)
+        let weight = if it.landing.is_some() { 0.0 } else { it.mass };
+        (it.vein + 1, it.at, it.offset, given + weight * g)
     });
+    let landed = (points.clone()).filter(|it| it.landing.is_some() && it.mass > 0.0);
+    let landed = landed.map(|it| LoadMark {
+        action: LoadKind::Mass,
+        vein: it.vein + 1,
+        at: it.at,
+        offset: it.offset,
+        direction: DVec3::NEG_Z,
+        size: it.mass,
+        length: 0.0,
+    });
+    let landed: Vec<LoadMark> = landed.collect();
     // Tips at one point have one arrow.
     let tips = if scenario.joined { 1 } else { veins };
     let axis = [0.0; 2];
@@ -281,7 +295,7 @@ pub fn load_marks(scenario: &Scenario, time: Option<f64>) -> Vec<LoadMark> {
                     })
                 })
         });
-    marks.collect()
+    marks.chain(landed).collect()
 }
 
 /// What holds a leaf: bases, of which those at one place that are held alike are one, a tip, grips, and a foundation.

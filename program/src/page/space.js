@@ -256,14 +256,19 @@ const TURN = { radius: 0.06, angle: 1.5 * Math.PI, along: 24, around: 6 };
 /// Whether it is a moment, or one per length.
 const turns = (action) => action === "moment" || action === "couple";
 
-/// The arrow of a load: along z from the origin, turned to its direction. That of a moment is curved about it.
+/// Radius of the ball of a mass that has landed, in radii of veins.
+const BALL = 2.5;
+
+/// The arrow of a load: along z from the origin, turned to its direction. That of a moment is curved about it; a mass is a ball.
 function loadMark({ action, direction, length }) {
   const mark = new THREE.Group();
   const thick = (action === "distributed" ? 0.35 : 0.6) * radius;
   const head = new THREE.ConeGeometry(3 * thick, 8 * thick, 12).rotateX(Math.PI / 2);
   const material = new THREE.MeshLambertMaterial({ vertexColors: true });
   const [reach, size] = [length * view.longest, 8 * thick];
-  if (turns(action)) {
+  if (action === "mass") {
+    mark.add(plain(new THREE.SphereGeometry(BALL * radius, 16, 12))(material));
+  } else if (turns(action)) {
     const [tube, tip] = [plain(curved(thick))(material), plain(head)(material)];
     const ring = TURN.radius * view.longest;
     tip.position.set(ring * Math.cos(TURN.angle), ring * Math.sin(TURN.angle), 0);
@@ -299,7 +304,7 @@ function tailOf({ action, vein, at, offset, direction, length }, leaf, mesh) {
   const place = placeOf(vein, at, leaf, mesh);
   const arm = offset && leaf.state ? armOf(offset, vein, at, leaf) : [0, 0, 0];
   const point = [...mesh.points.subarray(place, place + 3)].map((x, k) => x + arm[k]);
-  if (turns(action)) return point;
+  if (turns(action) || action === "mass") return point;
   const first = placeOf(vein, 0, leaf, mesh);
   const before = Math.max(first, place - 3);
   const tangent = [0, 1, 2].map((k) => mesh.points[before + 3 + k] - mesh.points[before + k]);

@@ -5,7 +5,7 @@ use crate::report::document::{ReportedResult, contender_name};
 use crate::report::numbers::{duration_text, format_error_bound, veins_text_for_count};
 use crate::report::table::{LabelledLines, label_first_line, text_cell};
 use leafdyn::scenario::Units;
-use leafdyn::study::{Chart, ChartRow, FastestByAccuracy, PeerProgram, ScalingStudy};
+use leafdyn::study::{Chart, ChartRemark, ChartRow, FastestByAccuracy, PeerProgram, ScalingStudy};
 use serde::Serialize;
 use serde_json::Value;
 use std::io;
@@ -124,7 +124,13 @@ fn fastest_by_accuracy_lines(chart: &Chart) -> Vec<String> {
 /// Failures, one line for each contender and kind of failure.
 fn failure_lines(chart: &Chart) -> Vec<String> {
     let mut kinds: Vec<(&ChartRow, Vec<String>)> = Vec::new();
-    for row in chart.rows.iter().filter(|row| !row.ending.is_success()) {
+    // What is refused altogether is told by a remark.
+    let is_charted = |row: &&ChartRow| {
+        let mut remarks = chart.remarks.iter();
+        !remarks.any(|remark| matches!(remark, ChartRemark::NotCharted { contender, .. } if *contender == row.contender))
+    };
+    let rows = chart.rows.iter().filter(is_charted);
+    for row in rows.filter(|row| !row.ending.is_success()) {
         let same =
             |other: &ChartRow| other.contender == row.contender && other.ending == row.ending;
         match kinds.iter_mut().find(|(other, _)| same(other)) {

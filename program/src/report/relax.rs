@@ -482,7 +482,8 @@ fn blade_lines(blade: &BladeReport, units: &Units) -> Vec<String> {
         ),
     };
     let mut lines = vec![format!(
-        "of the area {}; at its widest, {}, its bending stiffness is {} and its torsional stiffness {}{}",
+        "of the area {}; at its widest, {}, its bending stiffness is {} (E I of a strip that is free to curve across; held flat \
+         it has 1/(1 - poisson²) times that) and its torsional stiffness {}{}",
         number_in_unit(format_five_digits(blade.area), units, AREA),
         length(blade.width),
         stiffness(blade.bending),

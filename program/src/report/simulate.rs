@@ -6,9 +6,9 @@ use crate::report::numbers::{
     number_in_unit, position_error_text, round_to_error, tips_text, veins_text_for_count,
 };
 use crate::report::table::{LabelledLines, label_first_line};
-use leafdyn::numbers::{larger, largest};
-use leafdyn::scenario::Units;
-use leafdyn::scenario::units::{DAMPING, ENERGY, TIME};
+use leafdyn::numbers::{format_two_digits, larger, largest};
+use leafdyn::scenario::units::{DAMPING, ENERGY, LENGTH, TIME, VELOCITY};
+use leafdyn::scenario::{MotionStart, Units};
 use leafdyn::simulate::{LandingRecord, Record, SchemeReason};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
@@ -29,6 +29,7 @@ impl ReportedResult for Record {
             ("grid", format!("{} segments a vein", self.segments)),
             ("step", time_step_line(self, units)),
         ];
+        lines.extend(self.start.map(|start| ("start", start_line(start, self))));
         if self.choice.reason != SchemeReason::Requested {
             lines.push(("choice", self.choice.to_string()));
         }
@@ -41,11 +42,7 @@ impl ReportedResult for Record {
             ("damping", text)
         }));
         lines.extend(energy_lines(self, units));
-        let landings = self
-            .landings
-            .iter()
-            .map(|landing| landing_line(landing, units));
-        lines.extend(label_first_line("landing", landings));
+        lines.extend(label_first_line("landing", landing_lines(self, units)));
         let known = self.moments.iter().filter_map(|moment| moment.error);
         let decimals = match known.reduce(f64::max) {
             Some(error) => decimals_for_error(error),
@@ -53,6 +50,7 @@ impl ReportedResult for Record {
         };
         let tips = tips_text(&self.tips, decimals, units);
         lines.extend(tips.map(|tips| ("tip", tips)));
+        lines.push(("end", late_motion_line(self, units)));
         lines.push(("error", tip_error_line(self, units)));
         lines.push(("speed", speed_line(self)));
         lines
@@ -122,14 +120,59 @@ fn energy_lines(record: &Record, units: &Units) -> LabelledLines {
     vec![("energy", parts), ("balance", balance)]
 }
 
-/// When a mass landed, and what energy was lost.
-fn landing_line(landing: &LandingRecord, units: &Units) -> String {
-    let time = number_in_unit(format_five_digits(landing.time), units, TIME);
-    let lost = number_in_unit(format_five_digits(landing.lost_energy), units, ENERGY);
-    let LandingRecord { vein, at, .. } = landing;
-    format!(
-        "a mass on vein {vein} at {at:.3}, at t = {time}: energy {lost} lost, which finer grids lower"
-    )
+/// What the motion starts from.
+fn start_line(start: MotionStart, record: &Record) -> String {
+    let from = match (start, record.rods, record.joined) {
+        (MotionStart::AtRest, ..) => "at rest under the loads at time 0",
+        (MotionStart::Released, 1, _) => "released without load: the vein in its own shape",
+        (MotionStart::Released, _, true) => {
+            "released without load: veins as arcs that meet in the tip"
+        }
+        (MotionStart::Released, _, false) => "released without load: veins in their own shapes",
+    };
+    from.into()
+}
+
+/// When masses landed, what energy they brought, what of it their impacts lost, and what was damped until the end.
+fn landing_lines(record: &Record, units: &Units) -> Vec<String> {
+    let (Some(first), Some(last)) = (record.moments.first(), record.moments.last()) else {
+        return Vec::new();
+    };
+    if record.landings.is_empty() {
+        return Vec::new();
+    }
+    let off = (last.energy.balance() - first.energy.balance()).abs();
+    let in_unit = |text: String| number_in_unit(text, units, ENERGY);
+    let energy = |value: f64| in_unit(format_five_digits(round_to_error(value, off)));
+    let line = |landing: &LandingRecord| {
+        let LandingRecord { vein, at, .. } = landing;
+        let time = number_in_unit(format_five_digits(landing.time), units, TIME);
+        format!(
+            "a mass on vein {vein} at {at:.3}, at t = {time}: its kinetic energy {}; the impact, after which it \
+             moves with its node of the grid, loses {}, less on finer grids",
+            energy(landing.kinetic_energy),
+            energy(landing.lost_energy)
+        )
+    };
+    let lost: f64 = record.landings.iter().map(|it| it.lost_energy).sum();
+    let damped = energy(last.energy.dissipated - lost);
+    let off = in_unit(format_error_bound(off));
+    let damped = format!("damped until the end {damped}, within {off} by the balance");
+    record.landings.iter().map(line).chain([damped]).collect()
+}
+
+/// Whether the leaf still moves at the end.
+fn late_motion_line(record: &Record, units: &Units) -> String {
+    let speed = format_two_digits(record.tip_speed);
+    let speed = number_in_unit(speed, units, VELOCITY);
+    match record.moves_at_end() {
+        true => {
+            let by = format_two_digits(record.late_tip_motion());
+            let by = number_in_unit(by, units, LENGTH);
+            format!("still moving: the tip at {speed}, and by {by} in the last tenth of the time")
+        }
+        false => format!("hardly moving: the tip at {speed}"),
+    }
 }
 
 /// The bar on the tips, and where it ends.
@@ -167,7 +210,7 @@ fn speed_line(record: &Record) -> String {
 mod tests {
     use super::*;
     use crate::report::sample;
-
+    use glam::DVec3;
     use leafdyn::simulate::Stopped;
 
     /// The balance has the digits that its change leaves, and what is rounding is none.
@@ -191,6 +234,38 @@ mod tests {
         record.moments[last].energy.elastic = 4.068881005 * (1.0 + 4e-16);
         let report = record.report(&Units::default(), Vec::new(), false);
         assert!(report.contains(": changed by 0\n"), "{report}");
+    }
+
+    /// What a mass brings, what its impact loses and what is damped have the digits that the balance leaves, and a leaf
+    /// that stays where it is at the end does not move.
+    #[test]
+    fn energies_of_a_landing_and_a_leaf_that_rests() {
+        let mut record = sample::sample_record(1, 4);
+        let last = record.moments.len() - 1;
+        for moment in &mut record.moments {
+            moment.energy = moment.energy.map(|_| 0.0);
+            moment.tip = DVec3::X;
+        }
+        record.moments[last].energy.dissipated = 1.25;
+        record.moments[last].energy.work = 1.25 + 1.0 / 8192.0;
+        record.tip_speed = 1e-9;
+        record.landings = vec![LandingRecord {
+            point: 1,
+            vein: 1,
+            at: 0.5,
+            time: 1.0,
+            kinetic_energy: 2.0,
+            lost_energy: 0.50001,
+        }];
+        let report = record.report(&Units::default(), Vec::new(), false);
+        for part in [
+            "  landing  a mass on vein 1 at 0.500, at t = 1: its kinetic energy 2; the impact",
+            ", loses 0.5, less on finer grids\n           damped until the end 0.75, within 1.3×10⁻⁴ by the balance\n",
+            "  start    released without load: the vein in its own shape\n",
+            "  end      hardly moving: the tip at 1.0×10⁻⁹\n",
+        ] {
+            assert!(report.contains(part), "{part} in {report}");
+        }
     }
 
     #[test]

@@ -14,8 +14,9 @@ use glam::DVec3;
 use leafdyn::scenario::Units;
 use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH, RATE};
 use leafdyn::study::{
-    BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd, CorrectorFailure, ForceDisplacementLine,
-    PointKind, StabilityBoundary, Trace, TraceBranch, TracePoint, VerificationFailure,
+    BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd, BranchingKind, CorrectorFailure,
+    ForceDisplacementLine, PointKind, StabilityBoundary, Trace, TraceBranch, TracePoint,
+    VerificationFailure,
 };
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -52,6 +53,7 @@ impl ReportedResult for Trace {
         let branches = self.branches.iter().enumerate();
         let branches = branches.flat_map(|(number, branch)| branch_lines(self, number, branch));
         lines.extend(label_first_line("branch", branches));
+        lines.extend(critical_value_line(self).map(|line| ("critical", line)));
         let assumed = self.assumed.iter().flat_map(|it| it.words());
         let assumed: Vec<&str> = assumed.collect();
         if !assumed.is_empty() {
@@ -101,6 +103,14 @@ fn option_advice(trace: &Trace) -> Vec<String> {
             "branches cross here that are not followed: --switch follows the buckled ones".into(),
         );
     }
+    let loss = trace.branches.first().and_then(TraceBranch::stability_loss);
+    if let (Some((_, point)), None, false) = (loss, &trace.assumed, trace.switch) {
+        let value = varied_value_text(trace, point);
+        advice.push(format!(
+            "relax --all finds the shapes in which the leaf can rest beyond {value}: set {} there",
+            trace.keys
+        ));
+    }
     if trace.until.is_none() {
         let losses = trace.branches.iter().map(TraceBranch::index_increase_count);
         let first = losses
@@ -121,6 +131,37 @@ fn option_advice(trace: &Trace) -> Vec<String> {
 pub fn passes_crossings(trace: &Trace) -> bool {
     let mut critical = trace.branches.iter().flat_map(TraceBranch::critical_points);
     !trace.switch && critical.any(|(_, point)| matches!(point.kind, PointKind::Branching(_)))
+}
+
+/// Where the first branch loses its stability, and what the leaf does there.
+fn critical_value_line(trace: &Trace) -> Option<String> {
+    let (_, point) = trace.branches.first()?.stability_loss()?;
+    let mode = match point.critical_mode {
+        Some(mode) => mode.to_string(),
+        None => "buckles".into(),
+    };
+    let what = match (point.kind, point.branching) {
+        // The line of the branch says all.
+        (PointKind::Flutter | PointKind::Divergence, _) => return None,
+        (PointKind::Fold, _) => "the branch turns back, and the leaf snaps".into(),
+        (_, Some(BranchingKind::Supercritical)) => {
+            format!("it {mode}, steadily: the buckled branches lie beyond (supercritical)")
+        }
+        (_, Some(BranchingKind::Subcritical)) => {
+            format!("it {mode}, and jumps: the branches that cross lie before (subcritical)")
+        }
+        (_, Some(kind)) => format!("it {mode} ({})", kind.word()),
+        (_, None) => format!("it {mode}"),
+    };
+    let within = match point.value_error {
+        Some(error) => format!(" within {}", bound_in_unit(trace, error)),
+        None => String::new(),
+    };
+    let value = varied_value_text(trace, point);
+    Some(format!(
+        "stable up to {} = {value}{within}: there {what}",
+        trace.keys
+    ))
 }
 
 /// How a branch ended, its ends and its critical points.

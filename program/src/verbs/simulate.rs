@@ -9,13 +9,10 @@ use crate::verbs::request::{
 };
 use clap::Args;
 use leafdyn::memory;
-use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped};
+use leafdyn::simulate::{Options, Record, Refinement, Scheme, Simulation, Stopped, cheaper_text};
 
-/// Longer simulations, in seconds, are announced with their expected duration, and longer runs on
-/// finer grids.
-const ANNOUNCED_SECONDS: f64 = 60.0;
-
-const FINER_GRID_ANNOUNCED_SECONDS: f64 = 5.0;
+/// Longer runs, in seconds, are announced with their expected duration.
+const ANNOUNCED_SECONDS: f64 = 5.0;
 
 /// Larger recordings, in bytes, are announced with their expected size.
 const ANNOUNCED_BYTES: u64 = 1_000_000_000;
@@ -89,7 +86,11 @@ impl SimulateArguments {
             Err(_) if job.is_interrupted() => return Err(NOT_MOVED.into()),
             motion => motion?,
         };
-        announce_duration(&motion, job, ANNOUNCED_SECONDS);
+        let mut announced = announce_duration(&motion, job, None);
+        if !motion.cheaper_motions().is_empty() {
+            let (name, cheaper) = (&job.scenario.name, cheaper_text(motion.cheaper_motions()));
+            print_note(&format!("{name}: less would be taken with {cheaper}"));
+        }
         let mut line = job.progress_line();
         let mut last = None;
         while let Some(run) = motion.next_run(&mut |run| {
@@ -103,7 +104,7 @@ impl SimulateArguments {
             }
             let run = last.insert(run);
             motion.end_run(&mut run.simulation, run.stopped);
-            announce_duration(&motion, job, FINER_GRID_ANNOUNCED_SECONDS);
+            announced = announce_duration(&motion, job, announced);
         }
         drop(line);
         match last {
@@ -158,10 +159,17 @@ impl SimulateArguments {
     }
 }
 
-/// Says what the next run takes, if it takes more than so many seconds.
-fn announce_duration(motion: &Refinement, job: &ScenarioJob, seconds: f64) {
+/// Says what the next run takes, if it takes long and that was not told of this grid; returns its segments.
+fn announce_duration(
+    motion: &Refinement,
+    job: &ScenarioJob,
+    announced: Option<usize>,
+) -> Option<usize> {
+    if announced == Some(motion.segments()) {
+        return announced;
+    }
     if let Some((steps, expected)) = motion.expected()
-        && expected > seconds
+        && expected > ANNOUNCED_SECONDS
     {
         let (name, segments, steps) = (
             &job.scenario.name,
@@ -173,6 +181,7 @@ fn announce_duration(motion: &Refinement, job: &ScenarioJob, seconds: f64) {
             "{name}: {steps} steps to make on {segments} segments a vein, some {time}"
         ));
     }
+    Some(motion.segments())
 }
 
 fn show_progress(line: &mut ProgressLine, simulation: &Simulation) {

@@ -113,6 +113,67 @@ fn a_fork_is_found_and_both_its_sides() {
     assert!(stable(1) && stable(2), "what leaves the fork is stable");
 }
 
+/// An inextensible strut on hinges, on springs k across it: with w = a sin(q s), q = pi, its energy under P is
+/// a^2/4 (q^4 + k - P q^2) + a^4 q^4/64 (4 q^2 - 3 P), A2 = L = 1. It buckles at P = q^2 + k/q^2, steadily as long as
+/// k < q^4/3, and jumps beyond; from k = 4 q^4 on in two waves.
+#[test]
+fn a_strut_on_springs_buckles_steadily_or_jumps() {
+    let place = Workplace::new();
+    let squared = std::f64::consts::PI.powi(2);
+    for (springs, kind, told) in [
+        (10.0, "supercritical", "steadily"),
+        (100.0, "subcritical", "jumps"),
+    ] {
+        let strut = format!(
+            "
+            leaf = {{ rods = 1, length = 1.0, fan = [0.0], base_held = \"pinned\", base_spin = \"held\" }}
+            stiffness = {{ torsion = 10.0, bending_2 = 1.0, bending_3 = 1e3, axial = inf, shear_2 = inf, shear_3 = inf }}
+            foundation = {{ stiffness = [0.0, 0.0, {springs:?}] }}
+            grip = [{{ vein = 1, at = 1.0, stiffness = [0.0, inf, inf] }}]
+            "
+        );
+        place.write("strut.toml", &strut);
+        let load = squared + springs / squared;
+        let vary = format!(
+            "--vary load.tip_force[0]=0..{} --until unstable --out t",
+            -1.2 * load
+        );
+        let run = place.run(format!("trace strut.toml {vary}"));
+        run.ends(0).says(&[
+            "  critical stable up to load.tip_force[0] = -",
+            ": there it bends up or down, ",
+            told,
+            &format!(" ({kind})"),
+            "  advice   ",
+            "relax --all finds the shapes in which the leaf can rest beyond -",
+        ]);
+        let trace = place.json("t/trace.json");
+        let critical = trace["branches"][0]["critical"].only();
+        assert_eq!(critical["branching"], kind, "{critical}");
+        let (value, error) = (critical["value"].number(), critical["value_error"].number());
+        assert!(
+            (value + load).abs() <= error.max(1e-9 * load),
+            "{value} {load} {error}"
+        );
+    }
+}
+
+/// Of veins that nothing ties, which buckle together, one is followed, and the branch says so.
+#[test]
+fn of_several_directions_one_is_followed_and_it_is_told() {
+    let place = Workplace::new();
+    let two = "
+        leaf = { rods = 2, length = 1.0, fan = [0.0, 0.0], joined = false }
+        stiffness = { torsion = 10.0, bending_2 = 1e3, bending_3 = 1.0, axial = inf, shear_2 = inf, shear_3 = inf }
+        ";
+    place.write("two.toml", two);
+    let run = place.run("trace two.toml --vary load.tip_force[0]=0..-2.6 --switch --out t");
+    run.says(&[
+        "branches cross in 2 directions at -",
+        "in 2 directions, of which one is followed, to both its sides",
+    ]);
+}
+
 /// The paper's Fig. 7: Hooke's law is a very good approximation.
 #[test]
 fn a_leaf_that_is_pulled_obeys_hookes_law() {

@@ -746,6 +746,7 @@ impl Explicit {
         self.clock.impacts.push(Impact {
             point: landing.point,
             time: landing.time,
+            kinetic_energy: landing.kinetic_energy(),
             lost_energy: lost.dissipated,
         });
         self.past = PastSteps {

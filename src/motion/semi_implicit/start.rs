@@ -235,6 +235,7 @@ impl SemiImplicit {
         self.clock.impacts.push(Impact {
             point: landing.point,
             time,
+            kinetic_energy: landing.kinetic_energy(),
             lost_energy: exchange.dissipated,
         });
         exchange.work += weighed;

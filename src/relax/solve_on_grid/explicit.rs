@@ -72,11 +72,8 @@ const DESCENT: AcceleratedDescent = AcceleratedDescent {
     largest_stagnant_distance: 1e-6,
 };
 
-const RIGID_RODS_REFUSAL: &str = "a stiffness is inf, and no time step is short enough for rigid rods; \
-     give a number, or use semi-implicit";
-
-const HELD_SPIN_REFUSAL: &str = "leaf.base_spin = \"held\": its motion does not hold the spin of bases on hinges; use \
-     semi-implicit, or shooting";
+const HELD_SPIN_REFUSAL: &str = "it cannot hold the spin of bases on hinges (leaf.base_spin = \"held\"); use \
+     semi-implicit, or shooting, or leaf.base_spin = \"free\"";
 
 const DEAD_MOMENT_REFUSAL: &str = "under load.tip_moment or load.point.moment, dead moments without a potential, motion \
      need not come to rest; use semi-implicit, or shooting";
@@ -84,19 +81,23 @@ const DEAD_MOMENT_REFUSAL: &str = "under load.tip_moment or load.point.moment, d
 /// Refuses leaves that the explicit method cannot treat: rigid ones, and those under a dead moment,
 /// which may drive a motion forever.
 pub fn check(leaf: &Leaf) -> Result<(), RelaxError> {
-    let refuse = |why| Err(RefusedOption::new("method", "explicit", why).into());
+    let refuse = |why: String| Err(RefusedOption::new("method", "explicit", why).into());
     let rigid = |rod: &Rod| {
         let stiffest = (rod.force_stiffness.iter()).fold(0.0_f64, |m, h| m.max(h.max_abs()));
         stiffest.is_infinite()
     };
     if leaf.scenario().rods.iter().any(rigid) {
-        return refuse(RIGID_RODS_REFUSAL);
+        let keys = leaf.scenario().rigid_keys_text();
+        let why = format!(
+            "{keys}: no time step is short enough for rigid rods; give numbers, or use semi-implicit"
+        );
+        return refuse(why);
     }
     if leaf.loads.has_moments() {
-        return refuse(DEAD_MOMENT_REFUSAL);
+        return refuse(DEAD_MOMENT_REFUSAL.into());
     }
     if leaf.holds_spins() {
-        return refuse(HELD_SPIN_REFUSAL);
+        return refuse(HELD_SPIN_REFUSAL.into());
     }
     Ok(())
 }

@@ -6,7 +6,7 @@
 mod tests;
 
 use crate::scenario::format::error::{
-    ScenarioError, ScenarioResult, SourceLocation, shorten_excerpt,
+    ScenarioError, ScenarioResult, SourceLocation, UNKNOWN_KEY, shorten_excerpt,
 };
 use crate::scenario::format::path::{EntryPath, nearest_key};
 use crate::scenario::format::places::CommonPlaces;
@@ -125,7 +125,7 @@ impl Entries {
                     let meant = nearest_key(path).map(|key| format!(" (did you mean {key}?)"));
                     let (path, meant) = (shorten_excerpt(path), meant.unwrap_or_default());
                     let allowed = Key::allowed_in(table).join(", ");
-                    let problem = format!("unknown key {path}{meant}: allowed here: {allowed}");
+                    let problem = format!("{UNKNOWN_KEY} {path}{meant}: allowed here: {allowed}");
                     errors.push(self.source.unknown_key_error(own_path, row, problem));
                 }
             }

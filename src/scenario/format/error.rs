@@ -21,9 +21,12 @@ pub struct ScenarioError {
     /// The message without the place.
     pub problem: String,
     /// Errors about other entries that do not follow from this one, in the order of the format, as far
-    /// as they can be told; the message has all in the order of their lines.
+    /// as they can be told; the message has unknown keys first, and all others in the order of their lines.
     pub others: Vec<ScenarioError>,
 }
+
+/// What messages about keys that there are not begin with.
+pub(super) const UNKNOWN_KEY: &str = "unknown key";
 
 impl ScenarioError {
     /// An error at a place, alone and of no key.
@@ -45,10 +48,14 @@ impl ScenarioError {
     /// The whole message, where overrides are given by this option.
     pub fn message_with_option(&self, option: &str) -> String {
         let mut all: Vec<&ScenarioError> = [self].into_iter().chain(&self.others).collect();
-        // In the order of the lines of the file, then what it lacks, then what is set.
-        all.sort_by_key(|error| match error.place {
-            SourceLocation::File { line, .. } => line.unwrap_or(usize::MAX - 1),
-            SourceLocation::Set { .. } => usize::MAX,
+        // Unknown keys first, as others may follow from them; then in the order of the lines of the file, then what it
+        // lacks, then what is set.
+        all.sort_by_key(|error| {
+            let line = match error.place {
+                SourceLocation::File { line, .. } => line.unwrap_or(usize::MAX - 1),
+                SourceLocation::Set { .. } => usize::MAX,
+            };
+            (!error.problem.starts_with(UNKNOWN_KEY), line)
         });
         let all = all.into_iter().map(|error| match &error.place {
             SourceLocation::Set { given } => format!("{option} {given}: {}", error.problem),

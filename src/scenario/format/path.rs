@@ -388,7 +388,28 @@ pub(super) fn nearest_key(path: &str) -> Option<&'static str> {
     let candidates = Key::all().map(Key::path).chain(Key::tables());
     let near = candidates.map(|candidate| (strsim::levenshtein(&path, candidate), candidate));
     let (edits, candidate) = near.min()?;
+    // `dynamics.dampng` is a word of `dynamics.external_damping`.
+    let of_words = nearest_by_word(&path).filter(|by_word| by_word.0 < edits);
+    let (edits, candidate) = of_words.unwrap_or((edits, candidate));
     (edits <= most).then_some(candidate)
+}
+
+/// The first key of the table of a path of which a word is nearest to the name, and by how many edits; a shorter word
+/// than of four letters is like many.
+fn nearest_by_word(path: &str) -> Option<(usize, &'static str)> {
+    let (table, name) = path.rsplit_once('.')?;
+    let most = 1 + name.chars().count() / SPELLING.letters_per_edit;
+    let of_table = Key::all().filter(|key| key.table_path().table == table);
+    let by_word = |key: Key| {
+        let words = key
+            .table_path()
+            .name
+            .split('_')
+            .filter(|word| word.len() > 3);
+        let edits = words.map(|word| strsim::levenshtein(name, word)).min()?;
+        (edits < most).then_some((edits, key.path()))
+    };
+    of_table.filter_map(by_word).min_by_key(|(edits, _)| *edits)
 }
 
 /// The message for an unknown key, with what was probably meant.
@@ -436,6 +457,7 @@ mod tests {
             ("units.lenght", Some("units.length")),
             ("units.mass", None),
             ("monsoon", None),
+            ("dynamics.dampng", Some("dynamics.external_damping")),
         ] {
             assert_eq!(nearest_key(misspelt), key);
         }

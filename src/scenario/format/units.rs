@@ -39,6 +39,9 @@ pub const TIME: Dimension = [0, 0, 1];
 /// The dimension of frequencies and rates.
 pub const RATE: Dimension = [0, 0, -1];
 
+/// That of velocities.
+pub const VELOCITY: Dimension = [1, 0, -1];
+
 /// The dimension of masses.
 pub const MASS: Dimension = [-1, 1, 2];
 

@@ -125,7 +125,9 @@ fn refined_motion(
         last = Some(MotionRun { steps, ..run });
     }
     // The first run of a refinement is always made.
-    last.ok_or(SimulationError::Rigid)
+    last.ok_or_else(|| SimulationError::Rigid {
+        keys: scenario.rigid_keys_text(),
+    })
 }
 
 /// Segments of the grid on which the local error of semi-implicit steps is the scenario's tolerance: on finer

@@ -413,7 +413,49 @@ fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<FitRemark
             degrees_of_freedom: stats.degrees_of_freedom,
         });
     }
+    if !stats.has_known_deviations && stats.degrees_of_freedom > 0 {
+        remarks.extend(unequal_scatter_remark(stats));
+    }
     remarks
+}
+
+/// Fewer data of a column do not tell how it scatters, nor do residuals below this part of the leaf's length, to which
+/// equilibria are known.
+const FEWEST_SCATTERED_DATA: usize = 4;
+const SMALLEST_SCATTER: f64 = 1e-6;
+
+/// Columns whose residuals differ by a larger factor do not have one standard deviation: of four data each, that of
+/// equal ones differs so much in one of ten thousand cases.
+const LARGEST_SCATTER_RATIO: f64 = 30.0;
+
+/// The remark on columns that scatter differently, of data without standard deviations.
+fn unequal_scatter_remark(stats: &FitStatistics) -> Option<FitRemark> {
+    let mut sums: BTreeMap<String, (f64, usize)> = BTreeMap::new();
+    for component in stats.point.components() {
+        if component.is_uninformative || component.sd.is_some() {
+            continue;
+        }
+        let (sum, count) = sums.entry(component.quantity.column()).or_default();
+        *sum += (component.observed - component.model).powi(2);
+        *count += 1;
+    }
+    let least = SMALLEST_SCATTER * longest(&stats.model.base.scenario().rods);
+    let mut scatters: Vec<(f64, String)> = sums
+        .into_iter()
+        .filter(|(_, (_, count))| *count >= FEWEST_SCATTERED_DATA)
+        .map(|(column, (sum, count))| ((sum / count as f64).sqrt(), column))
+        .filter(|(scatter, _)| *scatter > least)
+        .collect();
+    scatters.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let [(small, smooth), .., (large, scattered)] = &scatters[..] else {
+        return None;
+    };
+    let ratio = large / small;
+    (ratio > LARGEST_SCATTER_RATIO).then(|| FitRemark::UnequalScatter {
+        scattered: scattered.clone(),
+        smooth: smooth.clone(),
+        ratio,
+    })
 }
 
 /// Data that are probably in other units than the scenario.

@@ -1,6 +1,7 @@
 //! What is said of a fit: why it did not converge, and what else is to be known of its minimum; and
 //! why a candidate experiment cannot be judged.
 
+use crate::numbers::format_two_digits;
 use crate::run::remarks;
 use crate::study::fit::data::DataFile;
 
@@ -108,6 +109,20 @@ remarks! {
             /// Number of data less that of free numbers.
             degrees_of_freedom: usize,
         } = "excessive-residuals",
+        /// Data without standard deviations, of which the residuals of one column are much larger than those of another.
+        #[error(
+            "one standard deviation is assumed for all data, but the residuals of {scattered} are {} times those of \
+             {smooth}, which then tell too little: give standard deviations (columns sd_{scattered}, sd_{smooth}, or \
+             sd of points)", format_two_digits(*.ratio)
+        )]
+        UnequalScatter {
+            /// The column with the largest residuals.
+            scattered: String,
+            /// The column with the smallest.
+            smooth: String,
+            /// The ratio of their root mean squares.
+            ratio: f64,
+        } = "unequal-scatter",
         /// A leaf that jumped to another equilibrium on the way.
         #[error(
             "on the way a leaf jumped to another equilibrium, that to which it relaxes from the start: compare with a \

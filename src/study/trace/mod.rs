@@ -8,7 +8,7 @@ pub(super) mod result;
 mod without_potential;
 
 use crate::branch::{
-    BranchEnd, ContinuationOptions, CriticalKind, CriticalPoint, EquilibriumPoint,
+    BranchEnd, BranchingKind, ContinuationOptions, CriticalKind, CriticalPoint, EquilibriumPoint,
     ExtrapolatedPoint, LeafFamily, NestedBranchEquations, ParameterRange, VerifiedBranch,
     begin_branch, switch_branches,
 };
@@ -421,6 +421,15 @@ fn force_displacement_line(
     ForceDisplacementLine::fit(*axis, &points?)
 }
 
+/// What is known of the critical points of a branch.
+#[derive(Default)]
+struct RecordedCrossings {
+    /// Where no crossing branch begins within the range, and where others cross besides those that are followed.
+    remarks: Vec<BranchRemark>,
+    /// On which side the branches lie that cross at points of the branch.
+    kinds: Vec<(usize, BranchingKind)>,
+}
+
 struct BranchEntrance {
     point: EquilibriumPoint,
     /// The indices of the branch and the point from which it was entered; none for the first.
@@ -499,8 +508,12 @@ impl BranchTracer<'_, '_> {
                 grid: refined.grid.clone(),
             });
             self.first = self.first.take().or(begun);
-            let missing = self.record_crossings(&followed, number, &mut entrances);
-            trace.branches[number].remarks.extend(missing);
+            let crossings = self.record_crossings(&followed, number, &mut entrances);
+            let branch = &mut trace.branches[number];
+            branch.remarks.extend(crossings.remarks);
+            for (point, kind) in crossings.kinds {
+                branch.points[point].branching = Some(kind);
+            }
             let left = followed.end == BranchEnd::RunLimitReached
                 || !entrances.is_empty()
                 || self.stopped_before_crossings;
@@ -519,14 +532,14 @@ impl BranchTracer<'_, '_> {
 
     /// Records the critical points of a branch; if requested, adds the first points of crossing
     /// branches, each with the indices of the branch and the point at which it was entered, if that
-    /// is new. Returns where no crossing branch begins within the range.
+    /// is new.
     fn record_crossings(
         &mut self,
         followed: &VerifiedBranch,
         number: usize,
         entrances: &mut VecDeque<BranchEntrance>,
-    ) -> Vec<BranchRemark> {
-        let mut missing = Vec::new();
+    ) -> RecordedCrossings {
+        let mut found = RecordedCrossings::default();
         let critical = followed.branch.critical.iter().zip(&followed.critical);
         for (which, ((after, critical), refined)) in critical.enumerate() {
             let mut crossings =
@@ -536,9 +549,21 @@ impl BranchTracer<'_, '_> {
                 critical: critical.clone(),
                 refined: refined.clone(),
             });
+            let at_stability = critical.indices.contains(&0) && !critical.is_vertex();
+            if at_stability && !self.family.limit.reached() {
+                let equations = self.grids.on_grid_of(&critical.state);
+                let kind = critical.branching_kind(equations);
+                found
+                    .kinds
+                    .extend(kind.map(|kind| (after + 1 + which, kind)));
+            }
             if critical.kind != CriticalKind::Branching || known || !self.request.switch {
                 continue;
             }
+            let value = self.family.value(refined.fraction);
+            // As many digits as tell one crossing from the next.
+            let value = format!("{value:.8e}").parse().unwrap_or(value);
+            let value = self.request.vary.keys.text(value);
             // If several modes become neutral at once due to symmetry, the branches
             // of all their combinations are rotated copies of each other.
             let new = switch_branches(
@@ -546,18 +571,20 @@ impl BranchTracer<'_, '_> {
                 critical,
                 self.tolerance,
             );
+            let directions = critical.modes.len();
             if new.is_empty() && !self.family.limit.reached() {
-                let value = self.family.value(refined.fraction);
-                // As many digits as tell one crossing from the next.
-                let value = format!("{value:.8e}").parse().unwrap_or(value);
-                let value = self.request.vary.keys.text(value);
-                missing.push(BranchRemark::CrossingNotFollowed { value });
+                found
+                    .remarks
+                    .push(BranchRemark::CrossingNotFollowed { value });
+            } else if directions > 1 {
+                let remark = BranchRemark::OneDirectionFollowed { value, directions };
+                found.remarks.push(remark);
             }
             self.stopped_before_crossings |= self.family.limit.reached();
             let from = Some([number, after + 1 + which]);
             entrances.extend(new.into_iter().map(|point| BranchEntrance { point, from }));
         }
-        missing
+        found
     }
 
     /// A branch in the scenario's units.
@@ -653,6 +680,7 @@ impl BranchTracer<'_, '_> {
             index,
             critical_mode_axis: None,
             critical_mode: None,
+            branching: None,
             motion: None,
             undulation: self.undulation_at(refined).unwrap_or_default(),
             stations: refined.grid.sigma().to_vec(),

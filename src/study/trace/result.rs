@@ -1,6 +1,6 @@
 //! The result of a trace.
 
-use crate::branch::{BranchEnd, CorrectorFailure, VerificationFailure};
+use crate::branch::{BranchEnd, BranchingKind, CorrectorFailure, VerificationFailure};
 use crate::leaf::BucklingMode;
 use crate::numbers::largest;
 use crate::relax::{AssumedMotion, DominantMotion, MotionInstability};
@@ -158,6 +158,8 @@ pub struct TracePoint {
     pub critical_mode_axis: Option<usize>,
     /// What the veins do in that mode.
     pub critical_mode: Option<BucklingMode>,
+    /// On which side the branches lie that cross where stability is lost or gained.
+    pub branching: Option<BranchingKind>,
     /// Its small motions, where loads have no potential.
     pub motion: Option<PointMotion>,
     /// Waves and twist of the veins.
@@ -322,6 +324,15 @@ impl TraceBranch {
         join_remarks(&self.remarks)
     }
 
+    /// The point at which a stable branch first loses its stability, with its index; none of a branch that is not
+    /// stable before, and where stability is lost between two points.
+    pub fn stability_loss(&self) -> Option<(usize, &TracePoint)> {
+        let pairs = self.points.windows(2).enumerate();
+        let mut losses = pairs.filter(|(_, pair)| pair[0].index == 0 && pair[1].index > 0);
+        let (before, pair) = losses.next()?;
+        (pair[1].kind != PointKind::Regular).then_some((before + 1, &pair[1]))
+    }
+
     /// Its critical points, with their indices.
     pub fn critical_points(&self) -> impl Iterator<Item = (usize, &TracePoint)> {
         let points = self.points.iter().enumerate();
@@ -361,6 +372,7 @@ impl Serialize for TracePoint {
             grip_reactions: &self.grip_reactions,
             error: self.error,
             energy: self.energy,
+            branching: self.branching,
             stability: PointStability(self),
         }
         .serialize(serializer)
@@ -381,6 +393,8 @@ struct SerializedPoint<'p> {
     grip_reactions: &'p [DVec3],
     error: Option<f64>,
     energy: f64,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    branching: Option<BranchingKind>,
     #[serde(flatten)]
     stability: PointStability<'p>,
 }

@@ -209,6 +209,7 @@ fn trace_point(
         index: unstable_roots.unwrap_or(before),
         critical_mode_axis: None,
         critical_mode: None,
+        branching: None,
         motion: Some(PointMotion {
             unstable_roots,
             dominant,

@@ -87,6 +87,15 @@ pub fn draw_support_marker(page: &mut Drawing, at: DVec2, held: SupportForm) {
     }
 }
 
+/// Radius of the ball that marks a mass, in pixels.
+const MASS_RADIUS: f64 = 5.0;
+
+/// Marks a mass that has landed on a vein: a ball.
+pub fn draw_mass_marker(page: &mut Drawing, at: DVec2) {
+    let rim = Some(Stroke::new(WHITE, 0.8));
+    page.draw_shape(circle_path(at, MASS_RADIUS), SECOND_SOLUTION_COLOR, rim);
+}
+
 /// Marks a point of a second solution, in a color that no vein has.
 pub fn draw_second_solution_dot(page: &mut Drawing, at: DVec2, radius: f64) {
     page.draw_shape(circle_path(at, radius), SECOND_SOLUTION_COLOR, None);

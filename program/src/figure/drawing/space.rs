@@ -126,6 +126,8 @@ struct EdgeLabels {
     small_panel_name: f64,
     /// From the top of a vertical edge to its name.
     vertical_name: DVec2,
+    /// How far a name that does not fit beside the numbers moves down.
+    below_ticks: f64,
 }
 
 const EDGE_LABELS: EdgeLabels = EdgeLabels {
@@ -135,6 +137,7 @@ const EDGE_LABELS: EdgeLabels = EdgeLabels {
     name: 25.0,
     small_panel_name: 14.0,
     vertical_name: DVec2::new(6.0, -12.0),
+    below_ticks: 16.0,
 };
 
 /// A box around all of these shapes.
@@ -441,12 +444,17 @@ impl<'s> SpacePanel<'s> {
             let name = self.setting.brief_axis_name(edge.axis, values);
             // A long name extends away from its edge, on the page, or is placed on top of it.
             let size = FONT_SIZE.text + 1.0;
-            let most =
-                page.width - Font::embedded().text_width(&name, size) - EDGE_LABELS.page_edge;
+            let least = Font::embedded().text_width(&name, size) + EDGE_LABELS.page_edge;
+            let most = page.width - least;
+            // Where the page ends it moves below the numbers.
+            let shifted = |x: f64| match x == at.x {
+                true => at,
+                false => DVec2::new(x, at.y + EDGE_LABELS.below_ticks),
+            };
             let (at, anchor) = match edge.axis {
                 _ if name.chars().count() < 3 => (at, TextAnchor::Middle),
-                0 | 1 if edge.outward.x < 0.0 => (at, TextAnchor::End),
-                0 | 1 => (at.with_x(at.x.min(most)), TextAnchor::Start),
+                0 | 1 if edge.outward.x < 0.0 => (shifted(at.x.max(least)), TextAnchor::End),
+                0 | 1 => (shifted(at.x.min(most)), TextAnchor::Start),
                 _ => (
                     self.project_point(edge.to) + EDGE_LABELS.vertical_name,
                     TextAnchor::End,

@@ -3,16 +3,16 @@
 
 use crate::figure::drawing::axes::round_step;
 use crate::figure::drawing::markers::{
-    ForceArrow, Marker, MomentArrow, RodPoint, draw_clamp_bar, draw_second_solution_dot,
-    draw_support_marker, draw_tip_marker, force_arrows, moment_arrows,
+    ForceArrow, Marker, MomentArrow, RodPoint, draw_clamp_bar, draw_mass_marker,
+    draw_second_solution_dot, draw_support_marker, draw_tip_marker, force_arrows, moment_arrows,
 };
 use crate::figure::drawing::{
     Color, Drawing, DrawingPath, PathStep, Stroke, TEXT_COLOR, WHITE, circle_path, color_of_vein,
     curve_between_fractions, is_drawable, polyline_path,
 };
 use crate::figure::scenario::{
-    FigureSetting, LoadMark, ParsedKey, SupportForm, load_marks, section_rotation, support_marks,
-    with_followers_as_dead,
+    FigureSetting, LoadKind, LoadMark, ParsedKey, SupportForm, load_marks, section_rotation,
+    support_marks, with_followers_as_dead,
 };
 use glam::{DQuat, DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, RodShape};
@@ -91,6 +91,8 @@ pub struct DrawnVeins {
     pub tip_support: Option<SupportForm>,
     pub grips: Vec<GrippedStretch>,
     pub forces: Vec<ForceArrow>,
+    /// Where masses have landed.
+    masses: Vec<DVec3>,
     pub moments: Vec<MomentArrow>,
     /// Corners of the bounding box.
     pub low: DVec3,
@@ -168,6 +170,8 @@ impl DrawnVeins {
             is_drawable(point).then_some(point)
         };
         self.moments = moment_arrows(loads, point);
+        let masses = loads.iter().filter(|mark| mark.action == LoadKind::Mass);
+        self.masses = masses.filter_map(|it| point(it.vein, it.at)).collect();
         self.forces = force_arrows(
             loads,
             &scenario.units,
@@ -259,6 +263,7 @@ impl DrawnVeins {
             tip_support: None,
             grips: Vec::new(),
             forces: Vec::new(),
+            masses: Vec::new(),
             moments: Vec::new(),
             low,
             high,
@@ -433,11 +438,14 @@ pub fn draw_leaf_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(
     }
 }
 
-/// Draws the markers along veins: points of a second solution, moments and grips.
+/// Draws the markers along veins: points of a second solution, masses that have landed, moments and grips.
 pub fn draw_vein_markers(page: &mut Drawing, veins: &DrawnVeins, place: impl Fn(DVec3) -> DVec2) {
     let radius = 0.7 + 0.6 * veins.line_width();
     for &point in &veins.dots {
         draw_second_solution_dot(page, place(point), radius);
+    }
+    for &mass in &veins.masses {
+        draw_mass_marker(page, place(mass));
     }
     for moment in &veins.moments {
         moment.draw(page, veins.largest_extent(), &place);

@@ -34,7 +34,7 @@ explicit | twisted | dead moments without a potential
 margin | twisted | has no potential, hence no barrier
 trace | twisted | there is no index to follow
 fit | leaf.joined | tip_x of free tips
-explicit | leaf.base_spin | does not hold the spin
+explicit | leaf.base_spin | cannot hold the spin
 simulate-explicit | beside load.point.offset | does not move masses off the axis
 simulate-semi-implicit | dynamics.clamped | the semi-implicit method holds the base
 keep-unstable | oval | leads to no equilibrium from this start
