@@ -40,6 +40,7 @@ use crate::relax;
 use crate::relax::{Equilibrium, EquilibriumTracker, RelaxError, StateOnGrid};
 use crate::run::{Instant, RefusedOption};
 use crate::scenario::{MotionStart, Scenario, assumed_rotary_inertia, plausibility_warnings};
+pub use crate::simulate::cheaper::{CheaperChange, CheaperMotion};
 pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub(crate) use crate::simulate::comparison::compared_points;
 pub use crate::simulate::comparison::{Frame, OutputSample, ShapeSnapshot};

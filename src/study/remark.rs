@@ -80,6 +80,12 @@ remarks! {
             /// The number that varies, there.
             value: String,
         } = "crossing-not-followed",
+        /// A first leaf that snapped while it was loaded.
+        #[error(
+            "it begins at a leaf that snapped on its way, to one of several equilibria in which it can rest: others, which \
+             relax --all finds, may lose their stability elsewhere"
+        )]
+        BeginsBeyondSnap = "begins-beyond-snap",
         /// A branch point at which several modes become neutral together.
         #[error(
             "at {value} branches cross in {directions} directions, of which one is followed, to both its sides: of a \

@@ -34,6 +34,28 @@ fn a_trace_is_a_table_a_summary_and_a_figure() {
     assert_eq!(last[3..5], ["-3.0", ""], "ends at the end of the range");
 }
 
+/// A leaf that snapped has other equilibria, which may lose their stability elsewhere.
+#[test]
+fn a_trace_from_a_leaf_that_snapped_says_so() {
+    let place = Workplace::new();
+    let text = "
+        name = 'seven'
+        leaf = { rods = 7, length = 0.15, fan = [-0.3, -0.2, -0.1, 0, 0.1, 0.2, 0.3], elevation = 1.2 }
+        section = { shape = 'ellipse', width = 1.2e-3, thickness = 0.4e-3, young = 2e9, mass_density = 900 }
+        load = { g = [0, 0, -9.81] }
+    ";
+    place.write("seven.toml", text);
+    let remark = "snapped on its way, to one of several equilibria";
+    place
+        .ok("relax seven.toml --write none")
+        .says(&["snapped at"]);
+    place
+        .ok("trace seven.toml --vary load.g[2]=-9.81..-11 --write json")
+        .says(&[remark]);
+    let flat = "trace seven.toml --set leaf.elevation=0 --vary load.g[2]=-9.81..-11 --write json";
+    assert!(!place.ok(flat).out.contains(remark));
+}
+
 /// With grips the table has the forces on them, and the figure shows the one that varies most.
 #[test]
 fn forces_on_grips_are_columns() {

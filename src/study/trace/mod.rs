@@ -15,8 +15,8 @@ use crate::branch::{
 use crate::leaf::{BucklingMode, Grid, Leaf, NodalField, displacement_part};
 use crate::memory;
 use crate::relax::{
-    Equilibrium, Options, RelaxError, SemiImplicit, check_natural_tips, check_segments, relax,
-    without_wind_or_followers,
+    Equilibrium, Event, Options, RelaxError, SemiImplicit, StabilityLoss, check_natural_tips,
+    check_segments, relax, without_wind_or_followers,
 };
 use crate::run::{Instant, Limit, RefusedOption};
 use crate::scenario::{EntryPath, Key, Scenario};
@@ -328,6 +328,13 @@ fn trace_with_points_from(
             (first, critical) = (run.first, run.critical);
         }
         Err(remark) => trace.remark = Some(remark),
+    }
+    let snapped = |event: &Event| event.happening == StabilityLoss::Snapped;
+    let path = rest.path.as_ref().filter(|_| given.is_none());
+    if let (Some(path), Some(first)) = (path, trace.branches.first_mut())
+        && path.events().iter().any(snapped)
+    {
+        first.remarks.push(BranchRemark::BeginsBeyondSnap);
     }
     let branches = &trace.branches;
     trace.complete =
