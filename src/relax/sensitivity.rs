@@ -571,12 +571,16 @@ struct DifferenceSteps {
     nonlinear: f64,
     /// For eigenvalues, whose modes may be close together, and for moments on clamps.
     eigenvalues: f64,
+    /// Size of a parameter over its unit up to which it counts as zero: squares of smaller numbers, and inverses of their
+    /// steps, leave the range of numbers.
+    least_size: f64,
 }
 
 const STEPS: DifferenceSteps = DifferenceSteps {
     linear: 0.125,
     nonlinear: 1e-3,
     eigenvalues: 3e-4,
+    least_size: 1e-100,
 };
 
 /// A term of a finite-difference rule.
@@ -635,7 +639,7 @@ pub(crate) struct Parameter<'a> {
 impl Parameter<'_> {
     fn step_unit(&self) -> f64 {
         match self.value.abs() {
-            size if size > 0.0 => size,
+            size if size > STEPS.least_size * self.unit => size,
             _ => self.unit,
         }
     }
