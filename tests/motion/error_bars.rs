@@ -269,7 +269,7 @@ fn bars_of_random_motions_cover_the_errors() {
 #[test]
 fn a_motion_without_a_step_is_not_refined() {
     let saddle = scenario("study/saddle", "");
-    let found = followed(&saddle, &Options::default());
+    let found = followed(&saddle, &moving(Scheme::SemiImplicit, None));
     assert_eq!((found.runs, found.frames.len()), (2, 1));
     assert!(!found.simulation.done());
 }

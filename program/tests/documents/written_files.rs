@@ -13,7 +13,7 @@ const VERBS: &str = "
     relax => centerlines.csv figure.png figure.svg summary.json => scenario method outcome rods segments tolerance residual error_estimate energy_error energy tip tip_force_sum base_reactions base_reaction stable negative_eigenvalues neutral_directions lowest_eigenvalues eigenvalue_errors path undulation model shear_effect stretch_effect work wall_seconds stations positions
     relax --all => equilibria.json equilibria.png equilibria.svg => scenario starts failed equilibria remark wall_seconds
     check => check.json check.png check.svg => scenario verdict rods tolerance difference within_estimates relaxation shooting stations differences
-    simulate --set dynamics.duration=0.5 => energy.csv energy.png energy.svg filmstrip.png filmstrip.svg motion.csv motion.json => scenario method outcome choice start rods segments tolerance assumed_damping duration time error_estimate error_known_until error_aim time_step stable_step steps frames energy tip tip_speed wall_seconds
+    simulate --segments 16 --set dynamics.duration=0.5 => energy.csv energy.png energy.svg filmstrip.png filmstrip.svg motion.csv motion.json => scenario method outcome choice start rods segments tolerance assumed_damping duration time error_estimate error_known_until error_aim time_step stable_step steps frames energy tip tip_speed wall_seconds
     trace --vary load.gravity[2]=-1..-1.1 => trace.csv trace.json trace.png trace.svg => scenario vary range rods segments tolerance complete branches law factorizations wall_seconds
 ";
 
