@@ -92,12 +92,7 @@ impl DirectSolver {
                 system.cell_blocks(0, 0).is_some(),
             ],
         };
-        let new = || Arc::new(MatrixPattern::new(of, border));
-        let kept = system.pattern.0.get_or_init(new);
-        let pattern = match kept.is_of(of, border) {
-            true => Arc::clone(kept),
-            false => new(),
-        };
+        let pattern = system.pattern.0.of_matrix(of, border);
         let solver = DirectSolver {
             pattern,
             first: system.first_node(),
@@ -190,6 +185,23 @@ impl DirectSolver {
         let symbolic = self.symbolic(system)?;
         let cholesky = symbolic.factorize_definite(system, &self.pattern.unknowns, shift)?;
         Ok(cholesky.map(|cholesky| self.factors(FactorizationKind::Cholesky(cholesky))))
+    }
+
+    /// As [`DirectSolver::factorize`], by a sparse factorization without a search for pivots if the matrix is positive
+    /// definite, as it `may_be`: that takes less time, and so do solutions with its factors.
+    pub fn factorize_likely_definite(
+        &self,
+        system: &System,
+        shift: f64,
+        may_be: bool,
+    ) -> Result<MatrixFactors, DirectError> {
+        if may_be
+            && !self.uses_condensation
+            && let Some(factors) = self.factorize_definite(system, shift)?
+        {
+            return Ok(factors);
+        }
+        self.factorize(system, shift)
     }
 
     /// As [`DirectSolver::factorize`], by the sparse factorization, whose pivots tell the signs of
