@@ -4,7 +4,7 @@
 
 use crate::branch::equations::{
     ACCURACY, AssembledForces, BranchEquations, CorrectorFailure, ITERATIONS,
-    LARGEST_CORRECTOR_INCREMENT, has_converged,
+    LARGEST_CORRECTOR_INCREMENT, factorize_matrix, has_converged,
 };
 use crate::branch::family::{
     CompletedIncrements, OutOfRange, force_parameter_derivative, place_supports, unbalanced_forces,
@@ -169,9 +169,7 @@ impl BranchEquations<'_> {
             self.factorizations += 1;
         }
         let pattern = self.pattern(0)?;
-        let may_be = self.may_be_definite;
-        let mut factors = pattern.factorize_likely_definite(&self.system, shift, may_be)?;
-        self.may_be_definite = factors.negative_eigenvalue_count() == 0;
+        let mut factors = factorize_matrix(&pattern, &self.system, shift)?;
         let rate = factors.solve_bordered(&forces_rate, &[]).increments;
         let step = self.balance(at, &linear.forces, &mut factors)?;
         Ok((step, linearized(rate, forces_rate, Some(factors))))
@@ -389,22 +387,18 @@ impl BranchEquations<'_> {
     ) -> Result<usize, CorrectorFailure> {
         let leaf = self.leaves.leaf_at(solution.params)?;
         let system = &mut self.system;
+        self.factorizations += 1;
         system.set_coupling(leaf);
         leaf.assemble(&solution.state, system);
         leaf.add_phase_conditions(&solution.state, system);
-        if !system.has_tissue() {
-            self.factorizations += 1;
-            if system.is_definite_without_coupling(shift) {
-                return Ok(0);
-            }
-            leaf.assemble(&solution.state, system);
-            leaf.add_phase_conditions(&solution.state, system);
+        if system.is_definite_without_coupling(shift) {
+            return Ok(0);
         }
+        leaf.assemble(&solution.state, system);
+        leaf.add_phase_conditions(&solution.state, system);
         self.factorizations += 1;
         let pattern = self.pattern(0)?;
-        let may_be = self.may_be_definite && self.system.has_tissue();
-        let factors = pattern.factorize_likely_definite(&self.system, shift, may_be)?;
-        Ok(factors.negative_eigenvalue_count())
+        Ok(factorize_matrix(&pattern, &self.system, shift)?.negative_eigenvalue_count())
     }
 }
 

@@ -97,8 +97,6 @@ pub struct BranchEquations<'a, const N: usize = 1> {
     pub(super) system: System,
     /// Whether the equations are solved rod by rod, which needs a positive definite matrix.
     pub(super) solves_rod_by_rod: bool,
-    /// Whether the last matrix that was factorized as a whole was positive definite.
-    pub(super) may_be_definite: bool,
     /// Matrices factorized so far.
     pub factorizations: usize,
 }
@@ -136,7 +134,6 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
             mass: dot(&system.mass_product(&ones), &ones),
             system,
             solves_rod_by_rod: true,
-            may_be_definite: true,
             factorizations: 0,
         }
     }
@@ -153,7 +150,6 @@ impl<'a, const N: usize> BranchEquations<'a, N> {
     pub fn refined(&self) -> Self {
         BranchEquations {
             solves_rod_by_rod: self.solves_rod_by_rod,
-            may_be_definite: self.may_be_definite,
             ..BranchEquations::from_leaves(self.leaves.refined())
         }
     }

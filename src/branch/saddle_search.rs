@@ -128,8 +128,8 @@ struct FloorStep {
 pub struct SaddleSearch {
     /// The saddle of index one, if one was reached.
     pub saddle: Option<EquilibriumPoint>,
-    /// Whether the search left the valley in which it began. Of 500 searches of 22 scenarios that did, on their first
-    /// grid and on finer ones, none led to a barrier that others did not.
+    /// Whether the search left the valley in which it began: of 499 searches of 22 scenarios none that did led to a
+    /// barrier on a finer grid.
     pub left_valley: bool,
 }
 

@@ -187,23 +187,6 @@ impl DirectSolver {
         Ok(cholesky.map(|cholesky| self.factors(FactorizationKind::Cholesky(cholesky))))
     }
 
-    /// As [`DirectSolver::factorize`], by a sparse factorization without a search for pivots if the matrix is positive
-    /// definite, as it `may_be`: that takes less time, and so do solutions with its factors.
-    pub fn factorize_likely_definite(
-        &self,
-        system: &System,
-        shift: f64,
-        may_be: bool,
-    ) -> Result<MatrixFactors, DirectError> {
-        if may_be
-            && !self.uses_condensation
-            && let Some(factors) = self.factorize_definite(system, shift)?
-        {
-            return Ok(factors);
-        }
-        self.factorize(system, shift)
-    }
-
     /// As [`DirectSolver::factorize`], by the sparse factorization, whose pivots tell the signs of
     /// eigenvalues closer to zero where veins are stiff.
     pub fn factorize_sparse(
