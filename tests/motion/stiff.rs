@@ -161,7 +161,7 @@ fn let_go_with_steps_by_their_error() {
     }
 }
 
-/// A step factorizes one matrix, which its further iterations keep, rigid rods or not: of two veins that are pulled about.
+/// A step factorizes one matrix, which its further iterations keep, rigid rods or not.
 #[test]
 fn a_step_factorizes_one_matrix() {
     for stiffness in [1e3, f64::INFINITY] {
