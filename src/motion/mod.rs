@@ -247,6 +247,15 @@ pub trait TimeIntegrator {
         f64::INFINITY
     }
 
+    /// The sum of the local errors (lengths, radians) of the steps since this was asked last, of a method whose
+    /// error determines its steps.
+    fn take_local_errors(&mut self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Sets the permitted local error of a step, before the first, of a method whose error determines its steps.
+    fn set_local_error(&mut self, _error: f64) {}
+
     /// Ends the motion at the first step behind a limit.
     fn set_limit(&mut self, limit: Limit) {
         self.clock_mut().limit = limit;

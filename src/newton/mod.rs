@@ -196,6 +196,21 @@ impl DefiniteSolver {
         Ok(())
     }
 
+    /// Solves for the right-hand side assembled in `system` with the matrix of the last solution, which is still that of
+    /// `system`; false if that cannot be done.
+    pub fn solve_with_last_matrix(&mut self, system: &mut System, tolerance: f64) -> bool {
+        match &mut self.factors {
+            Some(factors) => {
+                factors.solve(system, None);
+                true
+            }
+            None => matches!(
+                system.solve(None, tolerance),
+                LinearSolveOutcome::Converged(_)
+            ),
+        }
+    }
+
     /// Solves for other forces on the nodes with the matrix of the last solution.
     pub fn solve_again(&mut self, system: &mut System, forces: &NodalField) -> Option<NodalField> {
         match &mut self.factors {

@@ -177,15 +177,18 @@ impl Frame {
 pub(super) struct RunComparison {
     /// The bar over the error that the order of the methods says: the difference itself where a
     /// phase is lost.
-    safety: f64,
+    pub safety: f64,
     /// Two runs have parted where they differ by more than this part of the largest displacement in
     /// the motion: phases differ by so many radians, or one has snapped and the other has not.
-    parted: f64,
+    pub parted: f64,
     /// As long as displacements since the start differ by more than that part of the largest of
     /// them so far, as those of a shared tip do while waves cross the first segments, the order of
     /// the methods is not to be seen, and this factor is in its place. (A joined leaf let go needed
     /// 8.)
     unresolved_safety: f64,
+    /// Unless they differ by less than this part of the distance of the runs: that is then the distance of their starts,
+    /// as of a leaf that stays at rest.
+    static_part: f64,
     /// Runs that differ by less than this part of the longest rod have not parted, however little
     /// the leaf moves: they have come to rest, or vibrate with such an amplitude.
     negligible: f64,
@@ -197,6 +200,7 @@ pub(super) const COMPARISON: RunComparison = RunComparison {
     safety: 3.0,
     parted: 0.2,
     unresolved_safety: 10.0,
+    static_part: 1e-3,
     negligible: 1e-3,
     rounding: 1e-12,
 };
@@ -207,9 +211,17 @@ pub(super) struct Trajectory {
     points: Vec<DVec3>,
     /// Number of points at an output.
     points_per_output: usize,
-    /// The longest step before every output but the first, in the method's unit; infinite where
-    /// all steps have the same length.
-    pub longest_steps: Vec<f64>,
+    /// The steps before every output but the first.
+    pub steps: Vec<OutputSteps>,
+}
+
+/// The steps of a run between two outputs.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct OutputSteps {
+    /// The longest, in the method's unit; infinite where all steps have the same length.
+    pub longest: f64,
+    /// The sum of their local errors (lengths, radians); infinite where none are known.
+    pub local_errors: f64,
 }
 
 impl Trajectory {
@@ -225,7 +237,7 @@ impl Trajectory {
     }
 
     /// The largest displacement from the first output.
-    fn largest_displacement(&self) -> f64 {
+    pub fn largest_displacement(&self) -> f64 {
         let start = self.output_points(0).unwrap_or(&[]);
         let outputs = self.points.chunks(self.points_per_output.max(1));
         outputs.fold(0.0, |most, points| {
@@ -277,7 +289,7 @@ pub(super) struct MotionComparison {
     pub segments: usize,
     /// The bar over the distance from the other run.
     factor: f64,
-    /// Bars on what that distance does not show, where both runs have the same steps.
+    /// Bars on what that distance does not show, where steps are not half as long as those of the other run.
     of_steps: Option<Vec<f64>>,
     /// The distance from which runs have parted.
     parting_distance: f64,
@@ -323,6 +335,12 @@ impl MotionComparison {
         self
     }
 
+    /// Adds bars on the error of the steps, which the other run does not tell.
+    pub fn with_step_bars(mut self, bars: Vec<f64>) -> Self {
+        self.of_steps = Some(bars);
+        self
+    }
+
     /// Compares the points of an output, behind all before it.
     pub fn compare_output(&mut self, output: usize, points: &[DVec3]) {
         let of_steps = match &self.of_steps {
@@ -346,7 +364,8 @@ impl MotionComparison {
             let moves = points.iter().zip(other).zip(start.iter().zip(others_start));
             let moves = moves.map(|((a, b), (a0, b0))| ((*a - *a0) - (*b - *b0)).length());
             let of_moves = largest(moves);
-            let factor = match of_moves <= COMPARISON.parted * self.displacement {
+            let least = COMPARISON.static_part * distance;
+            let factor = match of_moves <= least.max(COMPARISON.parted * self.displacement) {
                 true => self.factor,
                 false => COMPARISON.unresolved_safety * self.factor,
             };

@@ -44,7 +44,7 @@ pub use crate::simulate::cheaper::{CheaperChange, CheaperMotion};
 pub use crate::simulate::choice::{MotionCost, SchemeChoice, SchemeReason};
 pub(crate) use crate::simulate::comparison::compared_points;
 pub use crate::simulate::comparison::{Frame, OutputSample, ShapeSnapshot};
-use crate::simulate::comparison::{MotionComparison, Trajectory};
+use crate::simulate::comparison::{MotionComparison, OutputSteps, Trajectory};
 pub use crate::simulate::record::{LandingRecord, Record, film_indices, snapshot_indices};
 pub use crate::simulate::refinement::{REFINEMENT_SECONDS, Refinement, RunObserver};
 pub use crate::simulate::remark::{Imbalance, MotionDoubt, MotionRemark, cheaper_text};
@@ -87,6 +87,10 @@ pub struct Simulation {
 /// The finest grid that is tried for a leaf which starts at rest, in segments a vein. On twice as many a motion takes
 /// eight times as long.
 const FINEST_START_SEGMENTS: usize = 256;
+
+/// Local errors of all steps between two outputs, together, that are rounding (lengths, radians): as of a leaf that stays at
+/// rest.
+const NEGLIGIBLE_LOCAL_ERROR: f64 = 1e-11;
 
 impl Simulation {
     /// The leaf at time 0. Where it starts at rest and does not come to rest on the usual grid, it moves on the coarsest
@@ -335,16 +339,32 @@ impl Simulation {
         if let Some(trajectory) = &mut self.trajectory {
             trajectory.add(&points);
             if self.made > 0 {
-                let longest = self.method.take_longest_step();
-                trajectory.longest_steps.push(longest);
+                trajectory.steps.push(OutputSteps {
+                    longest: self.method.take_longest_step(),
+                    local_errors: self.method.take_local_errors(),
+                });
             }
         }
     }
 
-    /// Bounds the steps to half of those of a coarser run.
-    fn bound_steps_by_coarser(&mut self, coarser: &Trajectory) {
-        let halves = coarser.longest_steps.iter().map(|longest| 0.5 * longest);
-        self.longest_steps = halves.collect();
+    /// Bounds the steps to half of those of a coarser run, but for those before outputs up to which the error of steps is
+    /// `known`; where the coarser run's have no errors, to the same, as shorter ones would tell nothing.
+    fn bound_steps_by_coarser(&mut self, coarser: &Trajectory, known: Option<&[bool]>) {
+        let bound = |(output, steps): (usize, &OutputSteps)| {
+            let known = known.and_then(|known| known.get(output)).copied();
+            match steps.local_errors <= NEGLIGIBLE_LOCAL_ERROR {
+                _ if known == Some(true) => f64::INFINITY,
+                true => steps.longest,
+                false => 0.5 * steps.longest,
+            }
+        };
+        self.longest_steps = coarser.steps.iter().enumerate().map(bound).collect();
+    }
+
+    /// Sets the permitted local error of a step, before the first.
+    fn set_local_error(&mut self, error: f64) {
+        self.tolerance = error;
+        self.method.set_local_error(error);
     }
 
     /// Bounds the steps to half of the time between outputs.

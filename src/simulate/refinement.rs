@@ -8,13 +8,18 @@
 //! points of a vibration, so that the bar at an output is the largest so far. A component whose
 //! phase the coarser run has lost altogether is wrong in it by up to twice its amplitude, and no
 //! more in the finer run: `COMPARISON.safety` lets the bar be the difference itself.
+//!
+//! Where the grid and not the steps makes the error, as of most leaves with tissue, steps half as long on every finer
+//! grid would be wasted. The first run by the semi-implicit method that is not accurate enough is therefore made once more
+//! in longer steps: how far both are apart is the error of those, and with the order of the method that of any others. Steps of
+//! finer runs are then as long as an error allows that is a small part of the bar, to which it is added.
 
 use crate::leaf::{Grid, Leaf};
 use crate::motion::Stopped;
 use crate::numbers::larger;
 use crate::scenario::Scenario;
 use crate::simulate::cheaper::{COSTLY_SECONDS, CheaperMotion, cheaper_motions};
-use crate::simulate::comparison::{MotionComparison, RunTrajectory, Trajectory};
+use crate::simulate::comparison::{COMPARISON, MotionComparison, RunTrajectory, Trajectory};
 use crate::simulate::remark::MotionDoubt;
 use crate::simulate::request::{DEFAULT_TIP_ERROR, Options, Scheme, SimulationError};
 use crate::simulate::{SchemeChoice, Simulation, start};
@@ -35,6 +40,12 @@ struct RefinementSteps {
     local_error: (f64, f64),
     /// The time of a run over that on a grid of half as many segments, in steps twice as long.
     cost_ratio: f64,
+    /// The ratio of the local errors of the steps of a run and of longer ones, which tell what the steps do to the error.
+    longer_steps: f64,
+    /// The part of the expected bar that the steps may add to it.
+    step_part: f64,
+    /// Where the longer steps are longer by at least this factor, they tell that.
+    told_step: f64,
     /// Explicit steps that are longer by no more than this factor count as equally long.
     equal_step: f64,
     /// Where runs part later than runs on coarser grids by less than this factor, they part for
@@ -52,6 +63,9 @@ const REFINEMENT: RefinementSteps = RefinementSteps {
     local_error_ratio: 8.0,
     local_error: (1e-12, 0.1),
     cost_ratio: 4.0,
+    longer_steps: 64.0,
+    step_part: 0.01,
+    told_step: 2.0,
     equal_step: 1.1,
     later_parting: 1.3,
     first_local_error: 1e-2,
@@ -63,6 +77,61 @@ struct Resolution {
     segments: usize,
     step: Option<f64>,
     tolerance: f64,
+    /// Whether the error of its steps is known from [`StepErrors`].
+    known_steps: bool,
+}
+
+/// What the steps of a run do to the error: the distance of two runs on one grid in steps of different lengths.
+struct StepErrors {
+    /// The permitted local error of the longer steps.
+    local_error: f64,
+    /// Bars on the error of the run in longer steps, at all outputs.
+    bars: Vec<f64>,
+    /// Whether the steps before every output but the first were longer.
+    longer: Vec<bool>,
+}
+
+impl StepErrors {
+    /// From runs with these permitted local errors; `None` if they have parted.
+    fn between(
+        shorter: &Trajectory,
+        longer: &Trajectory,
+        local_errors: [f64; 2],
+    ) -> Option<StepErrors> {
+        let [short, long] = local_errors;
+        let factor = COMPARISON.safety / (1.0 - Self::ratio(short, long));
+        let distances = shorter.distances(longer);
+        let (outputs, parted) = (shorter.steps.len() + 1, COMPARISON.parted);
+        let last = *distances.last()?;
+        if distances.len() != outputs || last > parted * shorter.largest_displacement() {
+            return None;
+        }
+        let steps = shorter.steps.iter().zip(&longer.steps);
+        Some(StepErrors {
+            local_error: long,
+            bars: distances.iter().map(|distance| factor * distance).collect(),
+            longer: steps
+                .map(|(short, long)| long.longest >= REFINEMENT.told_step * short.longest)
+                .collect(),
+        })
+    }
+
+    /// The ratio of the errors of runs with these permitted local errors, which are of third order in the step.
+    fn ratio(local_error: f64, other: f64) -> f64 {
+        (local_error / other).powf(2.0 / 3.0)
+    }
+
+    /// The bars of a run with this permitted local error.
+    fn bars(&self, local_error: f64) -> Vec<f64> {
+        let ratio = Self::ratio(local_error, self.local_error);
+        self.bars.iter().map(|bar| ratio * bar).collect()
+    }
+
+    /// The permitted local error with which the bar of the whole motion is at most this, as far as it is known.
+    fn local_error_for(&self, bar: f64) -> f64 {
+        let known = self.bars.last().copied().unwrap_or(f64::INFINITY);
+        self.local_error * (bar / known).powf(1.5).min(1.0)
+    }
 }
 
 /// What the first run is compared with.
@@ -128,9 +197,12 @@ pub struct Refinement {
     last: bool,
     /// Why there is no run with which the first is compared, if there is none.
     not_compared: Option<String>,
-    /// Whether the run before was followed to its end, and until when its error is known.
+    /// Whether the run before was followed to its end, until when its error is known, and its bar.
     completed: bool,
     known_until: Option<f64>,
+    bar: Option<f64>,
+    /// What steps do to the error, once it is known.
+    step_errors: Option<StepErrors>,
     seconds: f64,
     /// What the next run but the first takes: steps and seconds.
     expected: (f64, f64),
@@ -169,6 +241,7 @@ impl Refinement {
                 segments: first.segments(),
                 step: first.longest_step(),
                 tolerance: first.tolerance(),
+                known_steps: false,
             },
             before: None,
             next: Some(first),
@@ -181,6 +254,8 @@ impl Refinement {
             not_compared: None,
             completed: false,
             known_until: None,
+            bar: None,
+            step_errors: None,
             seconds: 0.0,
             expected: (0.0, 0.0),
         };
@@ -221,16 +296,21 @@ impl Refinement {
     /// if the limit ends that, the coarser one is there.
     pub fn next_run(&mut self, watch: &mut RunObserver) -> Option<Simulation> {
         let mut simulation = self.next.take()?;
-        let is_first = self.runs == 0 && self.coarser.is_none();
-        let comparison = match is_first {
-            true => match self.compare_first(&mut simulation, watch)? {
+        let comparison = match (self.runs, &self.coarser) {
+            (0, None) => match self.compare_first(&mut simulation, watch)? {
                 FirstComparison::Known(comparison) => comparison,
                 FirstComparison::Run(coarser) => {
                     self.first = Some(std::mem::replace(&mut simulation, *coarser));
                     None
                 }
             },
-            false => self.compare_next(&mut simulation),
+            (0, Some(_)) => self.compare_next(&mut simulation),
+            _ => {
+                if !self.last {
+                    self.lengthen_steps(&mut simulation, watch)?;
+                }
+                self.compare_next(&mut simulation)
+            }
         };
         simulation.choice = self.choice;
         simulation.aim = self.aim;
@@ -272,6 +352,7 @@ impl Refinement {
             }
             self.completed = stopped.is_none();
             self.known_until = simulation.known_until();
+            self.bar = bar;
             return;
         }
         if let Some(aim) = self.aim
@@ -305,7 +386,7 @@ impl Refinement {
         }
         self.seconds += coarser.seconds_so_far();
         let trajectory = coarser.trajectory.take().unwrap_or_default();
-        first.bound_steps_by_coarser(&trajectory);
+        first.bound_steps_by_coarser(&trajectory, None);
         self.coarser = Some(RunTrajectory {
             segments: coarser.segments(),
             trajectory,
@@ -326,6 +407,7 @@ impl Refinement {
             // The finer grid fails: what the coarser one found is the result.
             if let Some(before) = self.before {
                 self.last = true;
+                self.resolution = before;
                 self.next = self.build_run(before).ok();
             }
             return;
@@ -348,6 +430,7 @@ impl Refinement {
             segments: 2 * now.segments,
             step: now.step.map(|step| 0.5 * step),
             tolerance: self.local_error(now.tolerance / REFINEMENT.local_error_ratio),
+            known_steps: false,
         };
         let Ok(next) = self.build_with_steps(halved) else {
             return;
@@ -445,6 +528,7 @@ impl Refinement {
             segments,
             step,
             tolerance: self.local_error(own.tolerance * f64::powi(factor, 3)),
+            known_steps: false,
         };
         if let Some(step) = self.options.step {
             // Given steps are taken on the other grid, too, and steps half as long there tell what
@@ -492,7 +576,7 @@ impl Refinement {
         }
         let trajectory = self.run_unrecorded(run, watch)?;
         if factor > 1.0 {
-            first.bound_steps_by_coarser(&trajectory);
+            first.bound_steps_by_coarser(&trajectory, None);
         }
         let other = with_trajectory(trajectory);
         let comparison = MotionComparison::new(own.segments, other, self.length);
@@ -504,10 +588,61 @@ impl Refinement {
         relax::check_segments(&Leaf::new(&self.scenario), Some(segments), segments).is_ok()
     }
 
+    /// Lets the steps of the next run be longer than half of those of the run before, if their error stays a small part
+    /// of the bar; none inside if `watch` or the limit ends the run that tells it.
+    fn lengthen_steps(&mut self, next: &mut Simulation, watch: &mut RunObserver) -> Option<()> {
+        let (Some(bar), Scheme::SemiImplicit) = (self.bar, self.choice.scheme) else {
+            return Some(());
+        };
+        if self.runs == 1 {
+            self.step_errors = self.measure_step_errors(watch)?;
+        }
+        if let Some(errors) = &self.step_errors {
+            // The error of the next run is a fourth of that of this one.
+            let allowed = 0.25 * REFINEMENT.step_part * bar;
+            let tolerance = self.local_error(errors.local_error_for(allowed));
+            if tolerance > self.resolution.tolerance {
+                self.resolution.tolerance = tolerance;
+                self.resolution.known_steps = true;
+                next.set_local_error(tolerance);
+            }
+        }
+        Some(())
+    }
+
+    /// Makes the run before once more, in longer steps; none inside if these tell nothing.
+    fn measure_step_errors(&mut self, watch: &mut RunObserver) -> Option<Option<StepErrors>> {
+        let Some(before) = self.before else {
+            return Some(None);
+        };
+        let longer = Resolution {
+            tolerance: self.local_error(REFINEMENT.longer_steps * before.tolerance),
+            ..before
+        };
+        if longer.tolerance < REFINEMENT.local_error_ratio * before.tolerance {
+            // Already they have the largest local error that is allowed.
+            return Some(None);
+        }
+        let Ok(run) = self.build_run(longer) else {
+            return Some(None);
+        };
+        let trajectory = self.run_unrecorded(run, watch)?;
+        let local_errors = [before.tolerance, longer.tolerance];
+        let errors = (self.coarser.as_ref()).and_then(|shorter| {
+            StepErrors::between(&shorter.trajectory, &trajectory, local_errors)
+        });
+        Some(errors)
+    }
+
     /// The comparison of a later run with the one before.
     fn compare_next(&self, next: &mut Simulation) -> Option<MotionComparison> {
         let coarser = self.coarser.clone()?;
-        next.bound_steps_by_coarser(&coarser.trajectory);
-        Some(MotionComparison::new(next.segments(), coarser, self.length))
+        let errors = (self.step_errors.as_ref()).filter(|_| self.resolution.known_steps);
+        next.bound_steps_by_coarser(&coarser.trajectory, errors.map(|it| it.longer.as_slice()));
+        let comparison = MotionComparison::new(next.segments(), coarser, self.length);
+        Some(match errors {
+            Some(errors) => comparison.with_step_bars(errors.bars(self.resolution.tolerance)),
+            None => comparison,
+        })
     }
 }

@@ -156,30 +156,44 @@ pub fn equilibria(
             .into_iter()
             .chain(disturbed)
             .collect();
-        let known = &all;
+        let rough = SEARCH.rough_tolerance;
         let end = |start: &SemiImplicit| {
-            let rough = SEARCH.rough_tolerance;
             if rough > wanted
                 && !start.keep_unstable
                 && let Ok(ended) = find_within(*start, rough)
-                && let Some(number) = known.known_stable(&ended)
+                && is_at_stable_rest(&ended)
             {
-                return Ok(EndOfStart::Known(number));
+                return Ok(EndOfStart::Rough(Box::new(ended)));
             }
             Ok(EndOfStart::Relaxed(Box::new(find(*start)?)))
         };
-        let batch: Vec<Result<EndOfStart, RelaxError>> = starts.par_iter().map(end).collect();
+        let ends: Result<Vec<EndOfStart>, RelaxError> = starts.par_iter().map(end).collect();
+        let ends = ends?;
+        // Of the starts that led to one new equilibrium only the first is relaxed any further.
+        let new: Vec<bool> = (0..ends.len())
+            .map(|k| ends[k].is_first_in_new(&ends[..k], &all))
+            .collect();
+        let end = |(ended, (start, new)): (EndOfStart, (&SemiImplicit, bool))| match new {
+            true => Ok(EndOfStart::Relaxed(Box::new(find(*start)?))),
+            false => Ok(ended),
+        };
+        let batch: Vec<_> = ends.into_iter().zip(starts.iter().zip(new)).collect();
+        let batch: Vec<Result<EndOfStart, RelaxError>> = batch.into_par_iter().map(end).collect();
         next += SEARCH.parallel_starts;
         for (start, ended) in starts.iter().zip(batch) {
             let before = all.found.len();
             let ended = match ended? {
                 EndOfStart::Relaxed(ended) => *ended,
-                EndOfStart::Known(number) => {
-                    all.starts += 1;
-                    all.found[number].starts += 1;
-                    in_vain += 1;
-                    continue;
-                }
+                EndOfStart::Rough(rough) => match all.known_stable(&rough) {
+                    Some(number) => {
+                        all.starts += 1;
+                        all.found[number].starts += 1;
+                        in_vain += 1;
+                        continue;
+                    }
+                    // At full accuracy the first led elsewhere.
+                    None => find(*start)?,
+                },
             };
             if limit.reached() && !ended.outcome.is_success() {
                 // Stopped on its way, which says nothing of its start.
@@ -209,15 +223,36 @@ pub fn equilibria(
 
 /// Where a start led.
 enum EndOfStart {
-    /// To the equilibrium with this number, which was found before.
-    Known(usize),
+    /// To a stable equilibrium, to the rough tolerance.
+    Rough(Box<Equilibrium>),
+    /// To this, to the tolerance that is wanted.
     Relaxed(Box<Equilibrium>),
+}
+
+impl EndOfStart {
+    /// Whether it is a rough approximation to a stable equilibrium that is not `known`, and none of the ends `before` it
+    /// is of the same.
+    fn is_first_in_new(&self, before: &[EndOfStart], known: &Equilibria) -> bool {
+        let EndOfStart::Rough(rough) = self else {
+            return false;
+        };
+        let is_same = |end: &EndOfStart| match end {
+            EndOfStart::Rough(other) | EndOfStart::Relaxed(other) => {
+                is_at_stable_rest(other) && is_same_equilibrium(other, rough)
+            }
+        };
+        known.known_stable(rough).is_none() && !before.iter().any(is_same)
+    }
+}
+
+fn is_at_stable_rest(equilibrium: &Equilibrium) -> bool {
+    equilibrium.outcome.is_success() && equilibrium.stable() == Some(true)
 }
 
 impl Equilibria {
     /// The number of the stable equilibrium to which this one is a rough approximation.
     fn known_stable(&self, rough: &Equilibrium) -> Option<usize> {
-        if !rough.outcome.is_success() || rough.stable() != Some(true) {
+        if !is_at_stable_rest(rough) {
             return None;
         }
         self.found.iter().position(|found| {

@@ -273,3 +273,56 @@ fn a_motion_without_a_step_is_not_refined() {
     assert_eq!((found.runs, found.frames.len()), (2, 1));
     assert!(!found.simulation.done());
 }
+
+/// A leaf that stays at rest takes a step from output to output on every grid, and its bar is that of the grid: three times
+/// the distance from the leaf that is relaxed.
+#[test]
+fn a_leaf_at_rest_takes_one_step_an_output() {
+    let mut leaf = paper_leaf(3, [1.0; 3], [100.0; 3], 4.0);
+    leaf.dynamics.start = MotionStart::AtRest;
+    leaf.dynamics.duration = 3.0;
+    let options = Options {
+        scheme: Some(Scheme::SemiImplicit),
+        tolerance: Some(1e-4),
+        ..Options::default()
+    };
+    let found = followed(&leaf, &options);
+    assert!(found.runs > 1, "{}", found.simulation.segments());
+    let outputs = found.frames.len() - 1;
+    // The first steps find out how long they may be.
+    let steps = found.simulation.steps();
+    assert!(steps <= outputs + 15, "{steps} for {outputs} outputs");
+    let rest = leaf.relaxation().tolerance(1e-10).run().unwrap();
+    let middle = rest.shape.stations.iter().position(|at| *at == 0.5);
+    let middle = middle.unwrap();
+    let bar = found.simulation.error_bar().unwrap();
+    for frame in &found.frames {
+        let middles = (0..frame.rods).map(|rod| {
+            let nodes = frame.centerline(rod);
+            nodes[nodes.len() / 2].distance(rest.shape.rods[rod].nodes[middle].position)
+        });
+        let error = largest(middles).max(frame.tips(true)[0].distance(rest.tips[0]));
+        assert!(error < bar && bar < 4.0 * error, "{error:e}, {bar:e}");
+    }
+}
+
+/// Where the grid makes the error, as of a plate that falls, steps on the finer grid are not half as long: the bar is hardly
+/// larger than with such steps.
+#[test]
+fn steps_are_as_long_as_the_grid_allows() {
+    let leaf = scenario("study/plate", "dynamics.duration=0.2");
+    let found = followed(&leaf, &Options::default());
+    let halved = leaf.tolerance / 8.0;
+    let own = found.simulation.tolerance();
+    assert!(found.runs == 2 && own > 3.0 * halved, "{own:e}");
+    let shorter = Options {
+        segments: Some(found.simulation.segments()),
+        tolerance: Some(halved),
+        ..Options::default()
+    };
+    let shorter = followed(&leaf, &shorter);
+    let [steps, others] = [&found, &shorter].map(|it| it.simulation.steps());
+    assert!(3 * steps < 2 * others, "{steps} for {others}");
+    let bars = [&found, &shorter].map(|it| it.simulation.error_bar().unwrap());
+    assert!(bars[0] < 1.05 * bars[1], "{bars:?}");
+}

@@ -160,3 +160,20 @@ fn let_go_with_steps_by_their_error() {
         }
     }
 }
+
+/// A step factorizes one matrix, which its further iterations keep, rigid rods or not.
+#[test]
+fn a_step_factorizes_one_matrix() {
+    for stiffness in [1e3, f64::INFINITY] {
+        let scenario = stiff(pulled(three_veins()), stiffness);
+        let start = rest(&scenario, 8);
+        let leaf = Leaf::new(&scenario);
+        let mut method = semi_implicit(&leaf, &start, StepControl::LocalError(1e-6));
+        method.advance(2.0).unwrap();
+        let (steps, matrices) = (method.steps(), method.factorizations);
+        assert!(
+            steps > 20 && 4 * matrices < 5 * steps,
+            "{matrices} in {steps} steps"
+        );
+    }
+}

@@ -25,7 +25,7 @@ pub struct ChartArguments {
     #[command(flatten)]
     request: ScenarioArguments,
 
-    /// About how long to measure; slow runs are made once whatever they take
+    /// About how long to measure; slow runs are made once, and give up after this time and 10 s
     #[arg(long, value_name = "S", default_value_t = ChartOptions::default().seconds, allow_negative_numbers = true)]
     seconds: f64,
 

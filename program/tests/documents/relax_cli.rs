@@ -89,8 +89,8 @@ fn every_number_that_is_given_has_a_derivative() {
     fs::write(place.path("rod.toml"), text).unwrap();
     let changes = |keys: &str| {
         let asked = format!("relax rod.toml --sensitivity {keys} --modes 0 --json --write none");
-        let found = place.run(&asked).ends(0).json();
-        found["sensitivities"].list().clone()
+        let found: Value = place.run(&asked).ends(0).json();
+        found["sensitivities"].list().to_vec()
     };
     let all = changes("all");
     let one_by_one = changes(

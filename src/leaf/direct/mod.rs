@@ -92,12 +92,7 @@ impl DirectSolver {
                 system.cell_blocks(0, 0).is_some(),
             ],
         };
-        let new = || Arc::new(MatrixPattern::new(of, border));
-        let kept = system.pattern.0.get_or_init(new);
-        let pattern = match kept.is_of(of, border) {
-            true => Arc::clone(kept),
-            false => new(),
-        };
+        let pattern = system.pattern.0.of_matrix(of, border);
         let solver = DirectSolver {
             pattern,
             first: system.first_node(),

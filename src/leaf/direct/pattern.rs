@@ -64,15 +64,25 @@ impl MatrixPattern {
     }
 }
 
-/// The pattern with which the matrix of a leaf on a grid was first factorized as a whole: it is that of all systems of
-/// equations of this leaf.
+/// The first patterns with which the matrix of a leaf on a grid was factorized as a whole: they are those of all systems of
+/// equations of this leaf. There are two where tips are coupled along some axes only, as indices are then counted with
+/// fewer coupled unknowns than equations are solved with.
 #[derive(Clone, Debug, Default)]
-pub struct SharedPattern(Arc<OnceLock<Arc<MatrixPattern>>>);
+pub struct SharedPattern(Arc<[OnceLock<Arc<MatrixPattern>>; 2]>);
 
 impl SharedPattern {
-    /// The pattern, which `new` makes if there is none.
-    pub fn get_or_init(&self, new: impl FnOnce() -> Arc<MatrixPattern>) -> &Arc<MatrixPattern> {
-        self.0.get_or_init(new)
+    /// The pattern of the matrix of these nodes, bordered by so many rows.
+    pub fn of_matrix(&self, nodes: NumberedNodes, border: usize) -> Arc<MatrixPattern> {
+        let new = || Arc::new(MatrixPattern::new(nodes, border));
+        if border > 0 {
+            // Families of leaves keep theirs.
+            return new();
+        }
+        let mut kept = self.0.iter().map(|place| place.get_or_init(new));
+        match kept.find(|kept| kept.is_of(nodes, border)) {
+            Some(kept) => Arc::clone(kept),
+            None => new(),
+        }
     }
 }
 
@@ -82,9 +92,10 @@ pub struct SystemPattern(pub SharedPattern);
 
 impl Drop for SystemPattern {
     fn drop(&mut self) {
-        let symbolic = self.0.0.get().and_then(|kept| kept.symbolic.get());
-        if let Some(Ok(symbolic)) = symbolic {
-            symbolic.spare.clear();
+        for kept in self.0.0.iter().filter_map(OnceLock::get) {
+            if let Some(Ok(symbolic)) = kept.symbolic.get() {
+                symbolic.spare.clear();
+            }
         }
     }
 }

@@ -223,4 +223,8 @@ fn memory_of_factors_is_taken_by_the_next_and_patterns_are_shared() {
     assert!(Arc::ptr_eq(&solver.pattern, &other.pattern));
     let bordered = DirectSolver::with_border(&system, 1).unwrap();
     assert!(!Arc::ptr_eq(&solver.pattern, &bordered.pattern));
+    // Tips are not coupled along x: indices are counted with fewer coupled unknowns.
+    let counted = [0; 2].map(|_| DirectSolver::for_coupling_pattern(&system).unwrap());
+    assert!(Arc::ptr_eq(&counted[0].pattern, &counted[1].pattern));
+    assert!(!Arc::ptr_eq(&counted[0].pattern, &solver.pattern));
 }

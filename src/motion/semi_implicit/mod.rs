@@ -48,6 +48,10 @@ struct SemiImplicitSettings {
     largest_step_ratio: f64,
     /// Newton iterations in a step; a step that needs more is shortened.
     most_iterations: usize,
+    /// An iteration of at most this size (radians, lengths) is followed by one with the same matrix, which costs a
+    /// fraction of one with its own; and that by another, if it is smaller by this factor.
+    kept_matrix_increment: f64,
+    kept_matrix_contraction: f64,
     /// Size of the last Newton iteration (radians, lengths), as a part of the permitted local error, of
     /// which its error stays a small part.
     iteration_error: f64,
@@ -78,6 +82,8 @@ const SETTINGS: SemiImplicitSettings = SemiImplicitSettings {
     least_step_ratio: 0.2,
     largest_step_ratio: 2.0,
     most_iterations: 12,
+    kept_matrix_increment: 1e-3,
+    kept_matrix_contraction: 0.05,
     iteration_error: 1e-3,
     largest_iteration_error: 1e-9,
     fixed_step_iteration_error: 1e-12,
@@ -144,6 +150,14 @@ impl StepControl {
             StepControl::LocalError(error) | StepControl::CountOnly(error) => Some(error),
         }
     }
+
+    /// The first step that is tried.
+    fn first_step(self) -> f64 {
+        match self {
+            StepControl::Fixed(h) => h,
+            StepControl::LocalError(error) | StepControl::CountOnly(error) => 0.1 * error.cbrt(),
+        }
+    }
 }
 
 /// Motion of a node: velocity v, auxiliary acceleration a and acceleration w of the method, each an angular
@@ -189,9 +203,11 @@ pub struct SemiImplicit {
     weights: GeneralizedAlphaWeights,
     control: StepControl,
     step: f64,
-    /// A bound on the steps, and the longest step since [`TimeIntegrator::take_longest_step`].
+    /// A bound on the steps, the longest step since [`TimeIntegrator::take_longest_step`], and the sum of local
+    /// errors since [`TimeIntegrator::take_local_errors`].
     step_bound: f64,
     longest_taken: f64,
+    local_errors: f64,
     clock: MotionClock,
     /// Number of factorizations.
     pub factorizations: usize,
@@ -225,14 +241,10 @@ impl SemiImplicit {
             next: state.clone(),
             node_motions: vec![NodeMotion::default(); state.x.len()],
             next_node_motions: vec![NodeMotion::default(); state.x.len()],
-            step: match control {
-                StepControl::Fixed(h) => h,
-                StepControl::LocalError(error) | StepControl::CountOnly(error) => {
-                    0.1 * error.cbrt()
-                }
-            },
+            step: control.first_step(),
             step_bound: f64::INFINITY,
             longest_taken: 0.0,
+            local_errors: 0.0,
             weights: GeneralizedAlphaWeights::from_spectral_radius(SETTINGS.spectral_radius),
             control,
             clock: MotionClock::default(),
@@ -303,7 +315,10 @@ impl SemiImplicit {
             self.step = if last { next.max(self.step) } else { next };
         }
         match error {
-            Some(_) => self.accept(h),
+            Some(error) => {
+                self.local_errors += error;
+                self.accept(h);
+            }
             None => self.step = 0.25 * h,
         }
         if let (StepControl::Fixed(longest), Some(_)) = (self.control, error) {
@@ -351,6 +366,15 @@ impl TimeIntegrator for SemiImplicit {
         std::mem::take(&mut self.longest_taken)
     }
 
+    fn set_local_error(&mut self, error: f64) {
+        self.control = StepControl::LocalError(error);
+        self.step = self.control.first_step();
+    }
+
+    fn take_local_errors(&mut self) -> f64 {
+        std::mem::take(&mut self.local_errors)
+    }
+
     fn advance(&mut self, until: f64) -> Result<Snapshot, Stopped> {
         while self.clock.time < until || self.physics.next_landing_time() <= self.clock.time {
             self.clock.check_limit()?;
@@ -389,14 +413,18 @@ impl TimeIntegrator for SemiImplicit {
 }
 
 impl SemiImplicit {
-    /// Factorizes and solves; false if the matrix is not positive definite.
-    fn solve(&mut self) -> bool {
-        self.factorizations += 1;
-        let mut uncounted = SolverCounts::default();
+    /// Solves with the matrix of the iteration before in place of that of the trial, or factorizes and solves; false if
+    /// the matrix is not positive definite.
+    fn solve(&mut self, keeps_matrix: bool) -> bool {
         let accuracy = match self.control {
             StepControl::CountOnly(error) => SETTINGS.count_only_cg_accuracy * error,
             _ => SETTINGS.cg_accuracy,
         };
+        if keeps_matrix {
+            return (self.solver).solve_with_last_matrix(&mut self.system, accuracy);
+        }
+        self.factorizations += 1;
+        let mut uncounted = SolverCounts::default();
         self.solver
             .solve(&mut self.system, 0.0, None, accuracy, &mut uncounted)
             .is_ok()
@@ -477,10 +505,15 @@ impl SemiImplicit {
             }
         };
         let mut before = f64::INFINITY;
+        let mut keeps_matrix = false;
         for _ in 0..SETTINGS.most_iterations {
             self.update_motion(h);
-            self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_follower_forces(self.clock.time + h, w.gamma / (w.beta * h));
+            match keeps_matrix {
+                true => self.leaf.assemble_forces(&self.trial, &mut self.system),
+                false => self.leaf.assemble(&self.trial, &mut self.system),
+            };
+            let rate = w.gamma / (w.beta * h);
+            self.add_follower_forces(self.clock.time + h, (!keeps_matrix).then_some(rate));
             let (moving, inertia) = (&self.next_node_motions, &self.inertia);
             let supports = &self.supports;
             let (leaf, trial, nodes) = (&self.leaf, &self.trial, self.leaf.segments() + 1);
@@ -506,10 +539,10 @@ impl SemiImplicit {
                 &mut self.system,
                 trial,
                 inertia,
-                per_mass,
+                (!keeps_matrix).then_some(per_mass),
                 inertial,
             );
-            if !self.solve() {
+            if !self.solve(keeps_matrix) {
                 return None;
             }
             let size = self.system.largest_increment().larger();
@@ -526,6 +559,10 @@ impl SemiImplicit {
                 self.update_motion(h);
                 return Some(self.local_error(h));
             }
+            // The change of the matrix is that of the leaf since it was factorized.
+            keeps_matrix = size <= SETTINGS.kept_matrix_increment
+                && (!keeps_matrix || size <= SETTINGS.kept_matrix_contraction * before)
+                && !self.leaf.holds_spins();
             before = size;
         }
         None
@@ -754,14 +791,14 @@ fn free_wrench(supports: &Option<MovingSupports>, k: usize, on_node: Wrench) -> 
     }
 }
 
-/// Adds mass times `per_mass` to the matrix, and a moment and a force to the
+/// Adds mass times `per_mass` to the matrix, unless that is kept, and a moment and a force to the
 /// right-hand side, at all nodes with equations.
 fn add_inertia(
     leaf: &DiscreteLeaf,
     system: &mut System,
     state: &State,
     inertia: &[Inertia],
-    per_mass: f64,
+    per_mass: Option<f64>,
     load: impl Fn(usize, &DMat3) -> Wrench,
 ) {
     let n = state.segments();
@@ -769,6 +806,10 @@ fn add_inertia(
         for i in system.first_node()..=n {
             let k = state.base(j) + i;
             let tensor = inertia[k].tensor(state.q[k]);
+            let Some(per_mass) = per_mass else {
+                system.add_load(j, i, load(k, &tensor));
+                continue;
+            };
             let free_tensor = match i == 0 && leaf.holds_spins() {
                 true => leaf.tensor_across_joint(state, j, tensor),
                 false => tensor,
@@ -826,9 +867,9 @@ impl SemiImplicit {
 impl SemiImplicit {
     /// Adds the loads that turn with the sections, and the drag on the trial, which has the velocities at
     /// the end of the step, in the air of a time to the equations; the derivative of a velocity by the
-    /// displacement is `rate`. The derivatives by the directions of the sections are left out: they make
+    /// displacement is `rate`, none if the matrix is kept. The derivatives by the directions of the sections are left out: they make
     /// the matrix unsymmetric, and are small beside that of inertia in steps that resolve the motion.
-    fn add_follower_forces(&mut self, time: f64, rate: f64) {
+    fn add_follower_forces(&mut self, time: f64, rate: Option<f64>) {
         self.leaf.add_followers(&self.trial, &mut self.system);
         let Some(wind) = &self.wind else { return };
         let (leaf, system, moving) = (&self.leaf, &mut self.system, &self.next_node_motions);
@@ -839,15 +880,19 @@ impl SemiImplicit {
         let air = self.physics.air(time);
         for ((j, i), drag) in wind.drags(&self.trial, air, |k| moving[k].v[1]) {
             let half = 0.5 * drag.force();
-            let stiffness = 0.25 * rate * drag.velocity_derivative();
+            let stiffness = rate.map(|rate| 0.25 * rate * drag.velocity_derivative());
             let free = [free_axes(j, i), free_axes(j, i + 1)];
             for (node, free) in [i, i + 1].into_iter().zip(free) {
                 if free != DMat3::ZERO {
                     system.add_load(j, node, Wrench::from_force(free * half));
-                    system.add_displacement_spring(j, node, free * stiffness * free);
+                    if let Some(stiffness) = stiffness {
+                        system.add_displacement_spring(j, node, free * stiffness * free);
+                    }
                 }
             }
-            if !free.contains(&DMat3::ZERO) {
+            if let Some(stiffness) = stiffness
+                && !free.contains(&DMat3::ZERO)
+            {
                 system.add_adjacent_node_spring(j, i, free[0] * stiffness * free[1]);
             }
         }

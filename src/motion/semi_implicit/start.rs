@@ -106,7 +106,7 @@ impl SemiImplicit {
         }
         for _ in 0..FIRST_STEP.most_iterations {
             self.leaf.assemble(&self.trial, &mut self.system);
-            self.add_follower_forces(self.clock.time, 0.0);
+            self.add_follower_forces(self.clock.time, Some(0.0));
             let excess = |k: usize| {
                 let ([turn, shift], v) = (self.increment(k), self.node_motions[k].v);
                 [turn - h * v[0], shift - h * v[1]]
@@ -132,10 +132,10 @@ impl SemiImplicit {
                 &mut self.system,
                 trial,
                 inertia,
-                per_mass,
+                Some(per_mass),
                 inertial,
             );
-            if !self.solve() {
+            if !self.solve(false) {
                 return false;
             }
             self.advance_trial();
@@ -150,7 +150,7 @@ impl SemiImplicit {
         self.leaf.assemble(&self.state, &mut self.system);
         self.trial.clone_from(&self.state);
         self.next_node_motions.clone_from(&self.node_motions);
-        self.add_follower_forces(self.clock.time, 0.0);
+        self.add_follower_forces(self.clock.time, Some(0.0));
         let damping = self.physics.damping;
         let n = self.leaf.segments();
         let joined = self.leaf.tips_move_together();

@@ -1,6 +1,7 @@
 //! Who takes part in a chart: the methods with their accuracy settings, and their repeated runs.
 
 use crate::relax::{Method, Options, Outcome, RelaxError, START_TOLERANCE};
+use crate::run::{Instant, Limit};
 use crate::scenario::{Scenario, longest};
 use crate::shooting;
 use crate::shooting::ShootingFailureReason;
@@ -8,6 +9,7 @@ use crate::study::judge::{MethodSolution, Timed, run_timed};
 use crate::study::remark::SolutionRemark;
 use serde::{Serialize, Serializer};
 use std::fmt;
+use std::time::Duration;
 
 /// A method for an equilibrium, with one setting for its accuracy.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -111,6 +113,8 @@ pub struct RepeatedRuns<'s, R = MethodSolution, E = RelaxError> {
     pub first_result: Option<Result<R, E>>,
     /// Seconds of each run; ascending once all are made.
     pub seconds: Vec<f64>,
+    /// When a run gives up.
+    pub limit: Limit,
 }
 
 impl<'s, R, E> RepeatedRuns<'s, R, E> {
@@ -121,6 +125,7 @@ impl<'s, R, E> RepeatedRuns<'s, R, E> {
             setting: knob,
             first_result: None,
             seconds: Vec::new(),
+            limit: Limit::default(),
         }
     }
 }
@@ -151,11 +156,12 @@ impl RepeatedRuns<'_> {
         let shooting = self.contender.method.shooting();
         if shooting.is_some_and(|how| how.from_relaxed_leaf) {
             let accuracy = tolerance.unwrap_or(self.scenario.tolerance);
-            return shoot_from_relaxed_leaf(self.scenario, accuracy);
+            return shoot_from_relaxed_leaf(self.scenario, accuracy, &self.limit);
         }
         let options = Options {
             method: self.contender.method.on_grid(segments),
             tolerance,
+            limit: self.limit.clone(),
             ..Options::default()
         };
         run_timed(|| MethodSolution::from_relaxation(self.scenario, &options)).transpose()
@@ -167,10 +173,12 @@ impl RepeatedRuns<'_> {
 pub(super) fn shoot_from_relaxed_leaf(
     scenario: &Scenario,
     accuracy: f64,
+    limit: &Limit,
 ) -> Result<Timed<MethodSolution>, RelaxError> {
     shooting::check_models(scenario, true)?;
     let options = Options {
         tolerance: Some(START_TOLERANCE),
+        limit: limit.clone(),
         ..Options::default()
     };
     let found = run_timed(|| {
@@ -179,6 +187,7 @@ pub(super) fn shoot_from_relaxed_leaf(
         let asked = shooting::ShootingOptions {
             // Between veins that tissue ties shooting may take hours.
             gives_up: scenario.tissue.is_some(),
+            limit: limit.clone(),
             ..shooting::ShootingOptions::new(rest.shooting_start(), &rest.stations, precision)
         };
         let shot = rest
@@ -232,6 +241,8 @@ pub(super) struct RunTiming {
     fewest_runs: usize,
     /// Largest number of runs.
     most_runs: usize,
+    /// A run gives up after the time of the whole measurement, or after so many seconds if these are more.
+    patience_seconds: f64,
 }
 
 pub(super) const TIMING: RunTiming = RunTiming {
@@ -239,6 +250,7 @@ pub(super) const TIMING: RunTiming = RunTiming {
     short_seconds: 0.01,
     fewest_runs: 3,
     most_runs: 101,
+    patience_seconds: 10.0,
 };
 
 /// Progress of the measurement.
@@ -321,7 +333,8 @@ pub type RunOnce<'f, 's, R, E> = dyn Fn(&RepeatedRuns<'s, R, E>) -> Result<Timed
 /// Runs all settings once by `run_once`, in order, and those that are not slow a few times;
 /// then repeatedly for about `budget` seconds in all, each for about the same time.
 /// Settings of one contender are ordered by cost: if one takes longer than
-/// the budget (or is slow), those after it are not run. Returns the number of rounds.
+/// the budget (or is slow), those after it are not run; far beyond the budget it gives up. Returns the number of
+/// rounds.
 pub fn time_runs<'s, R, E>(
     all: &mut [RepeatedRuns<'s, R, E>],
     budget: f64,
@@ -339,12 +352,16 @@ pub fn time_runs<'s, R, E>(
         run_once(runs)
     };
     let longest = budget.max(TIMING.slow_seconds);
+    let patience = Duration::from_secs_f64(budget.max(TIMING.patience_seconds));
     let mut too_slow = Vec::new();
     for runs in all.iter_mut() {
         if too_slow.contains(&runs.contender) {
             continue;
         }
-        runs.first_result = Some(run(runs, 1, TIMING.fewest_runs).map(|found| {
+        runs.limit = Limit::with_deadline(Instant::now() + patience);
+        let first = run(runs, 1, TIMING.fewest_runs);
+        runs.limit = Limit::default();
+        runs.first_result = Some(first.map(|found| {
             runs.seconds.push(found.seconds);
             if found.seconds > longest {
                 too_slow.push(runs.contender);

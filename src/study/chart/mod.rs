@@ -30,8 +30,8 @@ use thiserror::Error;
 /// Options of a chart.
 #[derive(Clone, Debug)]
 pub struct ChartOptions {
-    /// Approximate total time of the measurement, in seconds; slow runs are made once, however
-    /// long they take.
+    /// Approximate total time of the measurement, in seconds; slow runs are made once, and give up after this time
+    /// (and after ten seconds).
     pub seconds: f64,
     /// The methods measured.
     pub contenders: Vec<SolverConfig>,

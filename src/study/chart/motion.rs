@@ -8,6 +8,7 @@
 
 use crate::motion::Stopped;
 use crate::relax;
+use crate::run::Limit;
 use crate::scenario::{Scenario, longest};
 use crate::simulate::{Options, Refinement, Scheme, Simulation, SimulationError, compared_points};
 use crate::study::chart::contender::{
@@ -43,6 +44,18 @@ pub struct MotionRun {
     error_estimate: Option<f64>,
     /// Why the motion ended early, if it did.
     stopped: Option<Stopped>,
+}
+
+impl MotionRun {
+    /// A motion that ended before its first output.
+    fn without_outputs(stopped: Stopped) -> Self {
+        MotionRun {
+            points: Vec::new(),
+            steps: 0,
+            error_estimate: None,
+            stopped: Some(stopped),
+        }
+    }
 }
 
 /// Repeated runs of a motion.
@@ -96,10 +109,10 @@ fn run_once(runs: &MotionRuns) -> Result<Timed<MotionRun>, SimulationError> {
     let scheme = scheme(runs.contender);
     match runs.setting {
         AccuracySetting::Tolerance(aim) => {
-            run_timed(|| refined_motion(runs.scenario, scheme, aim)).transpose()
+            run_timed(|| refined_motion(runs.scenario, scheme, aim, &runs.limit)).transpose()
         }
         AccuracySetting::Segments(segments) => {
-            run_timed(|| motion_on_grid(runs.scenario, scheme, segments)).transpose()
+            run_timed(|| motion_on_grid(runs.scenario, scheme, segments, &runs.limit)).transpose()
         }
     }
 }
@@ -109,10 +122,12 @@ fn refined_motion(
     scenario: &Scenario,
     scheme: Option<Scheme>,
     aim: f64,
+    limit: &Limit,
 ) -> Result<MotionRun, SimulationError> {
     let options = Options {
         scheme,
         tolerance: Some(aim),
+        limit: limit.clone(),
         ..Options::default()
     };
     let mut refinement = Refinement::new(scenario, &options)?;
@@ -123,6 +138,12 @@ fn refined_motion(
         steps += run.steps;
         refinement.end_run(&mut simulation, run.stopped);
         last = Some(MotionRun { steps, ..run });
+    }
+    if limit.reached() && last.is_none() {
+        // Not even the run with which the first is compared was made.
+        return Ok(MotionRun::without_outputs(Stopped::Interrupted {
+            time: 0.0,
+        }));
     }
     // The first run of a refinement is always made.
     last.ok_or_else(|| SimulationError::Rigid {
@@ -140,6 +161,7 @@ fn motion_on_grid(
     scenario: &Scenario,
     scheme: Option<Scheme>,
     segments: usize,
+    limit: &Limit,
 ) -> Result<MotionRun, SimulationError> {
     let finer = segments as f64 / BALANCED_SEGMENTS;
     let [least, most] = LOCAL_ERRORS;
@@ -147,6 +169,7 @@ fn motion_on_grid(
         scheme,
         segments: Some(segments),
         tolerance: Some((scenario.tolerance / finer.powi(3)).clamp(least, most)),
+        limit: limit.clone(),
         ..Options::default()
     };
     Ok(follow(&mut Simulation::new(scenario, &options)?))
@@ -252,7 +275,7 @@ fn extrapolate(scenario: &Scenario, scheme: Scheme, seconds: f64) -> Option<Extr
         let Timed {
             result: Ok(run),
             seconds: taken,
-        } = run_timed(|| motion_on_grid(scenario, Some(scheme), segments))
+        } = run_timed(|| motion_on_grid(scenario, Some(scheme), segments, &Limit::default()))
         else {
             break;
         };

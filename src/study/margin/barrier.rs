@@ -82,47 +82,64 @@ pub(super) fn lowest_energy_barrier(
     let counted = all.load(std::sync::atomic::Ordering::Relaxed);
     let pushes = counted.saturating_sub(MODE_SADDLE_SEARCHES);
     all.store(pushes + starts.len(), std::sync::atomic::Ordering::Relaxed);
-    let count = starts.len();
-    for _ in 0..BARRIER.most_refinements {
-        let found = lowest_pass_from_starts(stable, &starts, weight);
-        if found.is_some() || stable.limit.reached() {
-            return LowestBarrier {
-                barrier: found,
-                searches: count,
-            };
+    let searches = starts.len();
+    for refinement in 0..=BARRIER.most_refinements {
+        let found = search_passes(stable, &starts, refinement > 0);
+        let barrier = lowest_barrier_of_passes(stable, found.passes, weight);
+        if barrier.is_some() || refinement == BARRIER.most_refinements || stable.limit.reached() {
+            return LowestBarrier { barrier, searches };
         }
-        let finer: Option<_> = starts
-            .iter()
-            .map(|it| start_on_halved_grid(stable, it))
+        // What left its valley on this grid does so on finer ones.
+        let finer: Option<Vec<SaddleSearchStart>> = (starts.iter().zip(&found.left_valley))
+            .filter(|(_, left)| !**left)
+            .map(|(start, _)| start_on_halved_grid(stable, start))
             .collect();
-        let Some(finer) = finer else {
-            return LowestBarrier {
-                barrier: None,
-                searches: count,
-            };
-        };
-        starts = finer;
-        all.fetch_add(count, std::sync::atomic::Ordering::Relaxed);
+        match finer {
+            Some(finer) if !finer.is_empty() => starts = finer,
+            _ => break,
+        }
+        all.fetch_add(starts.len(), std::sync::atomic::Ordering::Relaxed);
     }
     LowestBarrier {
-        barrier: lowest_pass_from_starts(stable, &starts, weight),
-        searches: count,
+        barrier: None,
+        searches,
     }
 }
 
-/// The lowest pass found from these start points on their grids.
-fn lowest_pass_from_starts(
+/// What searches from several start points found.
+struct PassSearches {
+    passes: Vec<MountainPass>,
+    /// Of every start point, whether the search left its valley.
+    left_valley: Vec<bool>,
+}
+
+/// The passes found from these start points on their grids.
+fn search_passes(
     stable: &StableLeaf,
     starts: &[SaddleSearchStart],
-    weight: f64,
-) -> Option<Barrier> {
-    let mut passes: Vec<MountainPass> = (starts.par_iter())
-        .filter_map(|start| {
-            let pass = search_saddle(stable, start);
+    stays_in_valley: bool,
+) -> PassSearches {
+    let searched: Vec<PassSearch> = (starts.par_iter())
+        .map(|start| {
+            let search = search_pass(stable, start, stays_in_valley);
             stable.searches.finish_one();
-            pass
+            search
         })
         .collect();
+    PassSearches {
+        left_valley: searched.iter().map(|search| search.left_valley).collect(),
+        passes: (searched.into_iter())
+            .filter_map(|search| search.pass)
+            .collect(),
+    }
+}
+
+/// The barrier of the lowest of these passes that leads from the leaf to another equilibrium.
+fn lowest_barrier_of_passes(
+    stable: &StableLeaf,
+    mut passes: Vec<MountainPass>,
+    weight: f64,
+) -> Option<Barrier> {
     passes.sort_by(|a, b| a.height.total_cmp(&b.height));
     passes.dedup_by(|a, b| (a.height - b.height).abs() < BARRIER.same_height * b.height);
     let (pass, neighbour) = passes.iter().find_map(|pass| {
@@ -160,11 +177,36 @@ fn starts_along_modes(stable: &StableLeaf) -> Option<Vec<SaddleSearchStart>> {
     Some(modes.iter().flat_map(both).collect())
 }
 
+/// What a search from one start point found.
+struct PassSearch {
+    pass: Option<MountainPass>,
+    left_valley: bool,
+}
+
 /// Climbs to a saddle, and finds the stable leaf on the same grid.
-fn search_saddle(stable: &StableLeaf, start: &SaddleSearchStart) -> Option<MountainPass> {
+fn search_pass(
+    stable: &StableLeaf,
+    start: &SaddleSearchStart,
+    stays_in_valley: bool,
+) -> PassSearch {
     let mut equations = BranchEquations::new(stable.family, start.grid.clone());
     let stop = || stable.limit.reached();
-    let saddle = equations.search_saddle(&start.state, 0.0, &start.direction, &stop)?;
+    let (state, direction) = (&start.state, &start.direction);
+    let search = equations.search_saddle(state, 0.0, direction, stays_in_valley, &stop);
+    PassSearch {
+        left_valley: search.left_valley,
+        pass: (search.saddle)
+            .and_then(|saddle| pass_over_saddle(stable, start, &mut equations, saddle)),
+    }
+}
+
+/// The pass over a saddle that was reached from a start point.
+fn pass_over_saddle(
+    stable: &StableLeaf,
+    start: &SaddleSearchStart,
+    equations: &mut BranchEquations,
+    saddle: EquilibriumPoint,
+) -> Option<MountainPass> {
     let mut own = BranchEquations::new(stable.family, stable.grid.clone());
     let mut leaf = own.correct(&stable.state, 0.0, None).ok()?;
     while own.grid().segments() < start.grid.segments() {
