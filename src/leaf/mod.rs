@@ -56,7 +56,7 @@ pub use crate::leaf::supports::NodeFreedom;
 pub use crate::leaf::system::{
     AssemblyTotals, DiagonalBlocks, EquationWorkspace, MassLoad, System,
 };
-pub use crate::leaf::tissue::cells::{CellStiffness, ContractionResultants};
+pub use crate::leaf::tissue::cells::{CellStiffness, ContractionResultants, TissueForces};
 pub use crate::leaf::tissue::rigid::ForceCarriers;
 pub use crate::leaf::tissue::strips::HalfTurn;
 use crate::rod::Section;

@@ -22,7 +22,7 @@ pub(crate) mod motion_pairs;
 mod node_blocks;
 
 use crate::leaf::{
-    DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System,
+    DirectSolver, DiscreteLeaf, Increment, MatrixFactors, NodalField, State, System, TissueForces,
     displacement_part, hessian_at_constant_force, rotation_part,
 };
 use crate::modes::lanczos::{Lanczos, NormalizedEigenvector, RitzBound};
@@ -213,7 +213,7 @@ fn softened_leaf_modes(
             // Zero is that of a turn alone.
             eigenvalue: match mode.eigenvalue == 0.0 {
                 true => 0.0,
-                false => quotient(soft, state, &shape, &forces),
+                false => quotient(soft, state, &shape, &forces, TissueForces::Carried),
             },
             shape,
             forces,
@@ -652,8 +652,14 @@ pub fn forces(leaf: &DiscreteLeaf, state: &State, shape: &[Increment]) -> Vec<DV
 /// causes in the segments as independent variables. Errors of the shape or of these forces,
 /// from rounding or from the stiffness with which the forces were condensed out, have only a
 /// second-order effect; and no large stiffness enters. The leaf and the state may be near those
-/// to which both belong.
-pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces: &[DVec3]) -> f64 {
+/// to which both belong; the tissue may then have the forces of its strains in place of those that the state carries.
+pub fn quotient(
+    leaf: &DiscreteLeaf,
+    state: &State,
+    shape: &[Increment],
+    forces: &[DVec3],
+    tissue: TissueForces,
+) -> f64 {
     let n = leaf.segments();
     let mut sum = 0.0;
     for (j, i) in leaf.rod_index_pairs(0..n) {
@@ -677,7 +683,7 @@ pub fn quotient(leaf: &DiscreteLeaf, state: &State, shape: &[Increment], forces:
         let [a, b] = [j, j + 1].map(|rod| displacement_part(&shape[state.base(rod) + i]));
         sum += (b - a).dot(leaf.node_coupling(j, i) * (b - a));
     }
-    sum + leaf.tissue_curvature(state, shape)
+    sum + leaf.tissue_curvature(state, shape, tissue)
         + leaf.spring_curvature(state, shape)
         + leaf.lever_curvature(state, shape)
 }
@@ -767,6 +773,6 @@ pub fn eigenvalue(leaf: &DiscreteLeaf, state: &State, mode: &Eigenpair) -> f64 {
         let across = held.across(rotation_part(base));
         base[..3].copy_from_slice(&across.to_array());
     }
-    let quotient = quotient(leaf, state, &shape, &mode.forces);
+    let quotient = quotient(leaf, state, &shape, &mode.forces, TissueForces::Strained);
     quotient / mass(leaf, &physics, state, &shape) * physics.time_unit.powi(-2)
 }

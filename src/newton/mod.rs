@@ -425,6 +425,34 @@ impl NewtonIteration<'_> {
     }
 }
 
+/// A state at rest after two further steps of Newton's method.
+pub struct BalancedState {
+    pub state: State,
+    /// The state after the first of both.
+    pub before: State,
+}
+
+/// Takes two steps of Newton's method, with the factors of one matrix, from a state that is at rest within a tolerance.
+/// From then on steps differ by rounding alone. `None` if memory is short, or if a step is larger than `largest`
+/// (radians, lengths).
+pub fn balance_further(leaf: &DiscreteLeaf, state: &State, largest: f64) -> Option<BalancedState> {
+    let mut system = System::new(leaf);
+    leaf.assemble(state, &mut system);
+    leaf.add_phase_conditions(state, &mut system);
+    let solver = DirectSolver::new(&system).ok()?;
+    let mut factors = solver.factorize(&system, leaf.neutral_shift()).ok()?;
+    let mut step = |state: &State, system: &mut System| {
+        factors.solve(system, None);
+        let mut next = state.clone();
+        leaf.advance(state, system, 1.0, &mut next);
+        (largest_increment(system) <= largest).then_some(next)
+    };
+    let before = step(state, &mut system)?;
+    leaf.assemble_forces(&before, &mut system);
+    let state = step(&before, &mut system)?;
+    Some(BalancedState { state, before })
+}
+
 /// The largest rotation or displacement of the last solution.
 fn largest_increment(system: &System) -> f64 {
     system.largest_increment().larger()

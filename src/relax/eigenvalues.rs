@@ -1,10 +1,13 @@
 //! The lowest eigenvalues and modes of a leaf at rest: on nested grids, extrapolated, with their bars,
 //! in the units of the scenario.
 
-use crate::leaf::{DiscreteLeaf, Grid, Increment, Leaf, displacement_part, rotation_part};
+use crate::leaf::{
+    DiscreteLeaf, Grid, Increment, Leaf, State, TissueForces, displacement_part, rotation_part,
+};
 use crate::modes;
 use crate::modes::{Eigenpair, ModeRequest, ModesBelow};
 use crate::motion::Physics;
+use crate::newton::{BalancedState, balance_further};
 use crate::numbers::larger;
 use crate::relax::accuracy::NestedEquilibrium;
 use crate::relax::accuracy::richardson::{
@@ -39,9 +42,14 @@ struct EigenvalueAccuracy {
     added_grids: usize,
     /// Growth of the rounding error of an eigenvalue from grid to grid.
     rounding_growth: f64,
-    /// Error of an eigenvalue, as a part of it, over the number of segments times the unbalanced force: of blades whose
-    /// lengths differ by 1e-9 the eigenvalues scatter by 4.5 to 45 times that.
+    /// Error of an eigenvalue, as a part of it, over the number of segments times the unbalanced force, of leaves without
+    /// tissue.
     of_imbalance: f64,
+    /// Error of an eigenvalue of a leaf with tissue, as a part of it, over the last change of the softest by a step of Newton's
+    /// method: of others the part that changes is up to 70 times as large.
+    of_last_change: f64,
+    /// Largest step (radians, lengths) to the balance of a leaf that is at rest within a tolerance.
+    largest_balancing_step: f64,
     /// Growth of the largest bar on an added grid that is due to rounding, where the bars before are of
     /// `compared_grids` or more, as two may agree by chance, and those of `largest_listed` or less: this grid is left
     /// out, and no finer one added.
@@ -59,6 +67,8 @@ const EIGENVALUES: EigenvalueAccuracy = EigenvalueAccuracy {
     added_grids: 6,
     rounding_growth: 4.0,
     of_imbalance: 50.0,
+    of_last_change: 100.0,
+    largest_balancing_step: 1e-3,
     noisy_bar_growth: 4.0,
 };
 
@@ -192,6 +202,7 @@ pub fn lowest(
         finest: None,
         coarser: None,
         segments: Vec::new(),
+        is_stable: found.index == Some(0),
     };
     let sharp = requested || list.needs_values;
     let compares = requested && 2 * unknowns(&finest.leaf) <= UNKNOWNS.without_shapes;
@@ -263,12 +274,42 @@ struct NestedEigenvalues<'a> {
     coarser: Option<Cow<'a, GridLevel>>,
     /// Segments of each grid of the series.
     segments: Vec<usize>,
+    /// Whether the leaf is stable on its grids.
+    is_stable: bool,
 }
 
 /// The lowest modes on one grid: their number and their nodes are those of this grid alone.
 struct GridModes<'a> {
     level: Cow<'a, GridLevel>,
     pairs: Vec<Eigenpair>,
+}
+
+/// The leaf on a grid, in balance to rounding if tissue ties its veins: where positions are as accurate as was asked, the
+/// forces that stiff tissue carries need not be, and eigenvalues change with them.
+struct BalancedLevel<'a> {
+    level: Cow<'a, GridLevel>,
+    /// The state a step of Newton's method before, of a leaf with tissue.
+    before: Option<State>,
+}
+
+impl<'a> BalancedLevel<'a> {
+    /// The leaf of an equilibrium, which is stable or not: near a saddle Newton's method may lead to another equilibrium.
+    fn new(level: Cow<'a, GridLevel>, is_stable: bool) -> Self {
+        let GridLevel { leaf, state } = &*level;
+        let largest = EIGENVALUES.largest_balancing_step;
+        let further =
+            (is_stable && leaf.has_tissue()).then(|| balance_further(leaf, state, largest));
+        let Some(BalancedState { state, before }) = further.flatten() else {
+            let before = None;
+            return BalancedLevel { level, before };
+        };
+        let mut level = level.into_owned();
+        level.state = state;
+        BalancedLevel {
+            level: Cow::Owned(level),
+            before: Some(before),
+        }
+    }
 }
 
 impl<'a> NestedEigenvalues<'a> {
@@ -278,10 +319,11 @@ impl<'a> NestedEigenvalues<'a> {
         level: Cow<'a, GridLevel>,
         on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
     ) -> bool {
+        let BalancedLevel { level, before } = BalancedLevel::new(level, self.is_stable);
         let Some(pairs) = on(&level, &self.interpolated(&level.leaf)) else {
             return false;
         };
-        self.extend_series(&level, &pairs);
+        self.extend_series(&level, before.as_ref(), &pairs);
         self.replace_finest(level, pairs);
         true
     }
@@ -292,14 +334,35 @@ impl<'a> NestedEigenvalues<'a> {
         finest.map_or(Vec::new(), |finest| finest.interpolated(leaf))
     }
 
-    /// Adds the eigenvalues on a grid to the series, and what limits their accuracy there.
-    fn extend_series(&mut self, level: &GridLevel, pairs: &[Eigenpair]) {
+    /// Adds the eigenvalues on a grid to the series, and what limits their accuracy there; `before` is the state a step of
+    /// Newton's method before.
+    fn extend_series(&mut self, level: &GridLevel, before: Option<&State>, pairs: &[Eigenpair]) {
         self.series.push(pairs);
         self.segments.push(level.leaf.segments());
         self.series.rounding = modes::quotient_rounding(&level.leaf);
-        let segments = level.leaf.segments() as f64;
-        self.series.imbalance =
-            EIGENVALUES.of_imbalance * segments * level.leaf.residual(&level.state);
+        let Some(before) = before else {
+            let segments = level.leaf.segments() as f64;
+            self.series.imbalance =
+                EIGENVALUES.of_imbalance * segments * level.leaf.residual(&level.state);
+            return;
+        };
+        // The softest of those that are not zero.
+        let softest = (pairs.iter().enumerate()).find(|(_, pair)| pair.eigenvalue != 0.0);
+        let Some((k, softest)) = softest else {
+            return;
+        };
+        let carried = TissueForces::Carried;
+        let value = modes::quotient(
+            &level.leaf,
+            before,
+            &softest.shape,
+            &softest.forces,
+            carried,
+        );
+        let change = (value - softest.eigenvalue).abs() / self.series.unit(k);
+        // On one grid it may be small by chance.
+        let most = EIGENVALUES.of_last_change * change;
+        self.series.imbalance = larger(self.series.imbalance, most);
     }
 
     fn replace_finest(&mut self, level: Cow<'a, GridLevel>, pairs: Vec<Eigenpair>) {
@@ -307,35 +370,35 @@ impl<'a> NestedEigenvalues<'a> {
         self.coarser = before.map(|before| before.level);
     }
 
-    /// As [`NestedEigenvalues::add`], but leaves out a grid on which rounding makes the bars larger: the softest modes
-    /// of a nearly inextensible blade change with the forces that its stiff tissue carries, of which finer grids have
-    /// fewer digits.
+    /// As [`NestedEigenvalues::add`], but leaves out a grid on which rounding makes the bars larger.
     fn add_unless_noisy(
         &mut self,
         level: GridLevel,
         on: impl Fn(&GridLevel, &[Vec<Increment>]) -> Option<Vec<Eigenpair>>,
     ) -> bool {
+        let BalancedLevel { level, before } = BalancedLevel::new(Cow::Owned(level), self.is_stable);
         let Some(pairs) = on(&level, &self.interpolated(&level.leaf)) else {
             return false;
         };
-        let before = self.series.clone();
-        self.extend_series(&level, &pairs);
-        let bars = [&before, &self.series].map(EigenvalueSeries::largest_relative_bar);
+        let coarser = self.series.clone();
+        self.extend_series(&level, before.as_ref(), &pairs);
+        let bars = [&coarser, &self.series].map(EigenvalueSeries::largest_relative_bar);
         if let [Some(before_it), Some(with_it)] = bars
-            && before.grids.len() >= EIGENVALUES.compared_grids
+            && coarser.grids.len() >= EIGENVALUES.compared_grids
             && before_it <= 2.0 * EIGENVALUES.largest_listed
             && with_it > EIGENVALUES.noisy_bar_growth * before_it
         {
-            self.series = before;
+            self.series = coarser;
             self.segments.pop();
             return false;
         }
-        self.replace_finest(Cow::Owned(level), pairs);
+        self.replace_finest(level, pairs);
         true
     }
 
     fn clear(&mut self) {
         self.series.grids.clear();
+        self.series.imbalance = 0.0;
         self.segments.clear();
         (self.finest, self.coarser) = (None, None);
     }
@@ -555,8 +618,8 @@ struct EigenvalueSeries {
     wanted_relative_error: f64,
     /// Rounding error of an eigenvalue on the finest grid.
     rounding: f64,
-    /// Relative error of an eigenvalue there by what is not in balance in the leaf: unbalanced nodal forces change those
-    /// in the segments, with which the leaf is stiffer or softer.
+    /// Relative error of an eigenvalue by what is not in balance in the leaf: unbalanced nodal forces change those
+    /// in the segments and in the tissue, with which the leaf is stiffer or softer.
     imbalance: f64,
     /// Whether the leaf can turn without resistance: an eigenvalue within rounding of zero is then no
     /// doubt.

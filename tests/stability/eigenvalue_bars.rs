@@ -77,36 +77,73 @@ fn eigenvalues_between_grips_are_those_of_any_grids() {
     }
 }
 
-/// The softest modes of a nearly inextensible blade change with the forces that its stiff tissue carries, of which fine
-/// grids have few digits: no grid is added on which bars become larger.
-#[test]
-fn bars_of_a_blade_end_before_rounding_does() {
-    let blade = scenario("measured/blade", "");
-    let [fine, rough] = [1e-6, 1e-4].map(|tolerance| {
-        let mut options = with_modes(3, to(tolerance));
-        options.mode_shapes = true;
-        listed(&settled(&blade, &options))
-    });
-    for ((value, bar), (other, other_bar)) in fine.into_iter().zip(rough) {
-        assert!(bar < 1e-4 * value, "{value} within {bar}");
-        let apart = (value - other).abs();
-        assert!(apart <= bar + other_bar, "{value} within {bar}: {apart:e}");
-    }
+/// A pointed blade of two veins, of which stiff tissue ties the margins.
+const POINTED: &str = r#"
+    name = "pointed"
+    leaf = { rods = 2, elevation = 0.887 }
+    blade = { length = 25.0, thickness = 0.028, young = 5e4, young_across = 3.4e4, mass_density = 8e-6, poisson = 0.36, width = { at = [0.0, 0.3, 0.7, 1.0], value = [1.23, 1.59, 1.72, 0.56] } }
+    load = { g = [0.0, 0.0, -981.0] }
+"#;
+
+/// Eigenvalues of a blade with the shapes of its modes, and their bars.
+fn of_shapes(blade: &Scenario, tolerance: f64) -> Vec<(f64, f64)> {
+    let mut options = with_modes(3, to(tolerance));
+    options.mode_shapes = true;
+    listed(&settled(blade, &options))
 }
 
-/// Eigenvalues of blades whose lengths hardly differ scatter by what is out of balance in them: within the bars.
+/// Eigenvalues of blades at tolerances from 1e-3 to 1e-8 agree within their bars, which follow the tolerance: nothing scatters,
+/// however stiff the tissue is, and in the median bars are at most 30 times the differences.
 #[test]
-fn bars_of_blades_cover_what_is_out_of_balance() {
-    let found = [25.0, 25.000_000_01, 24.999_999_95].map(|length| {
-        let blade = scenario("measured/blade", &format!("blade.length={length:?}"));
-        let mut options = with_modes(3, to(1e-6));
-        options.mode_shapes = true;
-        listed(&settled(&blade, &options))
-    });
-    for (one, other) in [(0, 1), (0, 2), (1, 2)] {
-        for ((value, bar), (again, its_bar)) in found[one].iter().zip(&found[other]) {
-            let apart = (value - again).abs();
-            assert!(apart <= bar + its_bar, "{value} within {bar:e}: {apart:e}");
+fn bars_of_blades_follow_the_tolerance() {
+    let blades = [
+        (scenario("measured/blade", ""), [1e-4, 5e-5, 1e-7]),
+        (scenario("study/plate", ""), [5e-5, 5e-5, 5e-8]),
+        (parse(POINTED), [1e-4, 1e-6, 5e-8]),
+    ];
+    let mut ratios = Vec::new();
+    for (blade, largest) in blades {
+        let found = [1e-3, 1e-5, 1e-8].map(|tolerance| of_shapes(&blade, tolerance));
+        for (eigenvalues, largest) in found.iter().zip(largest) {
+            for (value, bar) in eigenvalues {
+                assert!(
+                    *bar < largest * value,
+                    "{}: {value} within {bar:e}",
+                    blade.name
+                );
+            }
+        }
+        for (one, other) in [(0, 1), (0, 2), (1, 2)] {
+            for ((value, bar), (again, its_bar)) in found[one].iter().zip(&found[other]) {
+                let apart = (value - again).abs();
+                let told = bar + its_bar;
+                ratios.push(told / apart);
+                assert!(
+                    apart <= told,
+                    "{}: {value} within {told:e}: {apart:e}",
+                    blade.name
+                );
+            }
+        }
+    }
+    ratios.sort_by(f64::total_cmp);
+    let median = ratios[ratios.len() / 2];
+    assert!(median < 30.0, "{median}");
+}
+
+/// Of blades whose lengths differ by less than anyone can measure eigenvalues differ as much: by minus four times that, and not
+/// by rounding of the forces in their tissue.
+#[test]
+fn eigenvalues_of_blades_that_hardly_differ_hardly_differ() {
+    for length in [25.0 + 1e-11, 25.0 - 5e-11, 25.0 + 1e-9] {
+        let found = [25.0, length].map(|length| {
+            let blade = scenario("measured/blade", &format!("blade.length={length:?}"));
+            of_shapes(&blade, 1e-6)
+        });
+        for ((value, _), (again, _)) in found[0].iter().zip(&found[1]) {
+            let apart = (value - again).abs() / value;
+            let longer = (length - 25.0_f64).abs() / 25.0;
+            assert!(apart < 10.0 * longer + 1e-10, "{length}: {value} {apart:e}");
         }
     }
 }

@@ -104,12 +104,12 @@ impl CornerStrip {
     }
 }
 
-/// Which forces the strips of a cell carry.
+/// Which forces the strips of the tissue carry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum CellForces {
-    /// Those of the state, which are condensed out.
+pub enum TissueForces {
+    /// Those of the state, which are condensed out: at rest they are in balance to more digits than strains have.
     Carried,
-    /// Those of their strains.
+    /// Those of their strains, in rigid directions those of the state.
     Strained,
 }
 
@@ -198,7 +198,7 @@ impl DiscreteLeaf {
         state: &State,
         cell: TissueCell,
         veins: &CellStrains,
-        forces: CellForces,
+        forces: TissueForces,
     ) -> [CornerStrip; 2] {
         let strained = veins.mean();
         [StripPlace::Ahead, StripPlace::Behind].map(|place| {
@@ -207,7 +207,7 @@ impl DiscreteLeaf {
             let strip = self.strips[self.strip_index(place, g, i)].contracted(strained);
             let ends = strip_ends(state, g, i);
             let carried = self.carried_tissue_force(state, place, g, i);
-            let carried = carried.filter(|_| forces == CellForces::Carried);
+            let carried = carried.filter(|_| forces == TissueForces::Carried);
             let force = carried.unwrap_or_else(|| strip.force(&ends, DVec3::ZERO));
             CornerStrip {
                 carrying: strip.carrying(&ends, force),
@@ -224,7 +224,7 @@ impl DiscreteLeaf {
         &self,
         state: &State,
         cell: TissueCell,
-        forces: CellForces,
+        forces: TissueForces,
         mut matrix: Option<&mut CellMatrix>,
     ) -> AssembledCell {
         let veins = self.cell_strains(state, cell);
@@ -278,7 +278,7 @@ impl DiscreteLeaf {
     ) -> f64 {
         let mut second = CellMatrix::zeros();
         let wanted = matrix.then_some(&mut second);
-        let found = self.assembled_cell(state, cell, CellForces::Carried, wanted);
+        let found = self.assembled_cell(state, cell, TissueForces::Carried, wanted);
         for k in 0..4 {
             let (rod, i) = cell.node(k);
             if i >= self.first_node() {
@@ -299,7 +299,7 @@ impl DiscreteLeaf {
         cell: TissueCell,
         mut add: impl FnMut(usize, usize, Wrench),
     ) -> f64 {
-        let found = self.assembled_cell(state, cell, CellForces::Strained, None);
+        let found = self.assembled_cell(state, cell, TissueForces::Strained, None);
         for k in 0..4 {
             let (rod, i) = cell.node(k);
             add(rod, i, cell_load(&found.gradient, k));
@@ -311,7 +311,7 @@ impl DiscreteLeaf {
     pub(in crate::leaf) fn cell_energy(&self, state: &State) -> f64 {
         let energy = |cell: TissueCell| -> f64 {
             let veins = self.cell_strains(state, cell);
-            let corners = self.corner_strips(state, cell, &veins, CellForces::Strained);
+            let corners = self.corner_strips(state, cell, &veins, TissueForces::Strained);
             let each = corners.iter().map(|it| it.carrying.stress());
             each.map(|stress| stress.energy).sum()
         };
@@ -321,7 +321,7 @@ impl DiscreteLeaf {
     /// The second derivatives of the energy of the strips of a cell.
     fn cell_matrix(&self, state: &State, cell: TissueCell) -> CellMatrix {
         let mut matrix = CellMatrix::zeros();
-        self.assembled_cell(state, cell, CellForces::Strained, Some(&mut matrix));
+        self.assembled_cell(state, cell, TissueForces::Strained, Some(&mut matrix));
         matrix.fill_lower_triangle_with_upper_triangle();
         matrix
     }
@@ -334,15 +334,39 @@ impl DiscreteLeaf {
         })
     }
 
-    /// Second derivatives of the energy of a cell along increments of its nodes.
+    /// Second derivatives of the energy of a cell along increments of its nodes: the squares of the strains of its
+    /// strips with their stiffnesses, as in [`CarryingStrip::curvature`], and what the stresses add.
     pub(super) fn cell_curvature(
         &self,
         state: &State,
         cell: TissueCell,
+        forces: TissueForces,
         increment: impl Fn(usize, usize) -> Increment,
     ) -> f64 {
+        let veins = self.cell_strains(state, cell);
+        let gradients = veins.gradients();
         let all = cell_increments(cell, increment);
-        all.dot(&(self.cell_matrix(state, cell) * all))
+        let pair = |[a, b]: [usize; 2]| {
+            PairGradient::from_fn(|k, _| {
+                all[UNKNOWNS * (if k < UNKNOWNS { a } else { b }) + k % UNKNOWNS]
+            })
+        };
+        let (mut sum, mut half) = (0.0, StrainFactors::default());
+        for corner in self.corner_strips(state, cell, &veins, forces) {
+            let (strip, end) = (corner.carrying.strip(), corner.end);
+            let [across, fold] = corner.strain_gradients(&gradients).map(|of| of.dot(&all));
+            sum += strip.condensing.y * across * across + strip.fold_stiffness * fold * fold;
+            sum += (corner.carrying.geometric_hessian()).curvature(&pair([end, 2 + end]));
+            let (stress, factors) = (corner.carrying.stress(), strip.vein_strain_factors());
+            half.force += 0.5 * stress.carried_across * factors.force;
+            half.moment += 0.5 * stress.fold * factors.moment;
+        }
+        for (vein, strain) in veins.strains.iter().enumerate() {
+            sum += strain
+                .hessian(half)
+                .curvature(&pair([2 * vein, 2 * vein + 1]));
+        }
+        sum
     }
 
     /// Calls `add` with the changes of the loads of a cell, as rods, nodes and loads, by increments of its
@@ -374,7 +398,7 @@ impl DiscreteLeaf {
         let veins = self.cell_strains(state, cell);
         let all = cell_increments(cell, increment);
         let strained = veins.gradients().forces.map(|of| of.dot(&all));
-        for corner in self.corner_strips(state, cell, &veins, CellForces::Carried) {
+        for corner in self.corner_strips(state, cell, &veins, TissueForces::Carried) {
             let part = |node: usize| -> Increment {
                 std::array::from_fn(|c| all[corner_unknown(corner.end, 6 * node + c)])
             };
@@ -410,7 +434,7 @@ impl DiscreteLeaf {
         let mut sums = vec![StrainFactors::default(); self.rods() * n];
         for cell in self.tissue_cells() {
             let veins = self.cell_strains(state, cell);
-            for corner in self.corner_strips(state, cell, &veins, CellForces::Strained) {
+            for corner in self.corner_strips(state, cell, &veins, TissueForces::Strained) {
                 let StripStress { across, fold, .. } = corner.carrying.stress();
                 let factors = corner.carrying.strip().vein_strain_factors();
                 for rod in [cell.gap, cell.gap + 1] {

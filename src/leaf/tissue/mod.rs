@@ -14,10 +14,10 @@ use crate::leaf::block_tridiagonal::{RodLane, rod_lane};
 use crate::leaf::discrete::{DiscreteLeaf, NodeLoad};
 use crate::leaf::state::{Increment, State, displacement_part, rotation_part};
 use crate::leaf::system::System;
-use crate::leaf::tissue::cells::minus_wrench;
+use crate::leaf::tissue::cells::{TissueForces, minus_wrench};
 use crate::leaf::tissue::strips::{PlacedStrip, StripPlace, strip_ends};
 use crate::numbers::largest;
-use crate::rod::{NodeBlock, NodePair, StripLoads, TissueStrip, Wrench};
+use crate::rod::{NodeBlock, NodePair, PairGradient, StripLoads, TissueStrip, Wrench};
 use glam::DVec3;
 use nalgebra::{SMatrix, SVector};
 
@@ -363,16 +363,32 @@ impl DiscreteLeaf {
         energy
     }
 
-    /// Second derivatives of the energy of the tissue along a shape, at all nodes but clamped bases.
-    pub fn tissue_curvature(&self, state: &State, shape: &[Increment]) -> f64 {
+    /// Second derivatives of the energy of the tissue along a shape, at all nodes but clamped bases. Where the tissue
+    /// carries the forces of the state, those that the shape causes in rigid directions are multipliers.
+    pub fn tissue_curvature(
+        &self,
+        state: &State,
+        shape: &[Increment],
+        forces: TissueForces,
+    ) -> f64 {
         let moving = self
             .each_node_strip()
             .filter(|it| it.node >= self.first_node());
         let each = moving.map(|it| {
             let [a, b] = [it.gap, it.gap + 1].map(|rod| &shape[state.base(rod) + it.node]);
-            let both = SVector::<f64, 12>::from_fn(|k, _| if k < 6 { a[k] } else { b[k - 6] });
-            let carried = self.rigid_tissue_force(state, it.gap, it.node);
-            both.dot(&(stiffness_matrix(it.strip, &it.ends(state), carried) * both))
+            let both = PairGradient::from_fn(|k, _| if k < 6 { a[k] } else { b[k - 6] });
+            let ends = it.ends(state);
+            match forces {
+                TissueForces::Carried => {
+                    let force = self.node_tissue_force(state, it, &ends);
+                    it.strip.carrying(&ends, force).curvature(&both, 2.0)
+                }
+                TissueForces::Strained => {
+                    let carried = self.rigid_tissue_force(state, it.gap, it.node);
+                    let force = it.strip.force(&ends, carried);
+                    it.strip.carrying(&ends, force).curvature(&both, 1.0)
+                }
+            }
         });
         let nodes: f64 = each.sum();
         let increment = |rod: usize, i: usize| match i < self.first_node() {
@@ -380,7 +396,7 @@ impl DiscreteLeaf {
             false => shape[state.base(rod) + i],
         };
         let cells = self.tissue_cells();
-        let cells = cells.map(|cell| self.cell_curvature(state, cell, increment));
+        let cells = cells.map(|cell| self.cell_curvature(state, cell, forces, increment));
         nodes + cells.sum::<f64>()
     }
 }

@@ -1,6 +1,7 @@
 use crate::leaf::discrete::DiscreteLeaf;
 use crate::leaf::state::{Increment, State};
 use crate::leaf::system::System;
+use crate::leaf::tissue::cells::TissueForces;
 use crate::leaf::{DirectSolver, Grid, Leaf};
 use crate::numbers::largest;
 use crate::rod::Wrench;
@@ -104,7 +105,8 @@ fn second_derivatives_are_those_of_the_loads() {
             let at = |k: usize| (k / 6, k % 6);
             shape.iter_mut().for_each(|node| *node = [0.0; 6]);
             let ((a, b), (d, e)) = (at(r), at(c));
-            let value = |shape: &[Increment]| leaf.tissue_curvature(&state, shape);
+            let value =
+                |shape: &[Increment]| leaf.tissue_curvature(&state, shape, TissueForces::Strained);
             if [a, d].iter().any(|node| node % 3 == 0) {
                 continue;
             }
