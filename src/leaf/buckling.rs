@@ -29,7 +29,8 @@ pub struct BucklingMode {
     /// What its veins do most.
     #[serde(rename = "motion")]
     pub kind: BucklingMotion,
-    /// The vein that does most, from 1; of several that do as much the first. None of a leaf of one vein.
+    /// The vein that does most, from 1; of several that do as much the first. None of a leaf of one vein, and where all
+    /// do as much.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vein: Option<usize>,
 }
@@ -74,12 +75,13 @@ impl BucklingMode {
         };
         let amount = |all: &DVec3| all.element_sum();
         let most = amounts.iter().map(amount).fold(0.0, f64::max);
-        let first = amounts
-            .iter()
-            .position(|all| amount(all) >= (1.0 - AS_MUCH) * most);
+        let does_as_much = |all: &DVec3| amount(all) >= (1.0 - AS_MUCH) * most;
+        let first = amounts.iter().position(does_as_much);
         Some(BucklingMode {
             kind,
-            vein: first.map(|vein| vein + 1).filter(|_| amounts.len() > 1),
+            vein: first
+                .map(|vein| vein + 1)
+                .filter(|_| !amounts.iter().all(does_as_much)),
         })
     }
 }

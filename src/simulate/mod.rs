@@ -299,12 +299,7 @@ impl Simulation {
     }
 
     fn seconds_of_tissue(&self) -> f64 {
-        match self.choice.scheme {
-            Scheme::Explicit => 0.0,
-            Scheme::SemiImplicit => {
-                choice::semi_implicit_step_of_tissue(&self.leaf, self.grid.segments())
-            }
-        }
+        choice::step_of_tissue(&self.leaf, self.grid.segments(), self.choice.scheme)
     }
 
     /// Seconds that the steps so far take on one core of a machine of 2020, without what tissue

@@ -364,6 +364,7 @@ impl Refinement {
                     error,
                     aim,
                     refined_within: self.refines().then_some(REFINEMENT_SECONDS),
+                    undamped: self.scenario.dynamics.internal_damping == 0.0,
                 },
                 (None, Some(from)) => MotionDoubt::RunsPart { from },
                 (None, None) => MotionDoubt::NotCompared {

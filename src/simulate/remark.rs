@@ -49,7 +49,8 @@ remarks! {
             format_two_digits(*.error), format_two_digits(*.aim),
             match .refined_within {
                 Some(seconds) => format!(
-                    "finer grids would take more than {seconds} seconds, or cannot be followed; give more segments"
+                    "finer grids would take more than {seconds} seconds, or cannot be followed; give more segments{}",
+                    if *.undamped { ", or dynamics.internal_damping, by which the ripples of a blow fade" } else { "" }
                 ),
                 None => "give more segments and shorter steps, or leave both out".into(),
             }
@@ -61,6 +62,8 @@ remarks! {
             aim: f64,
             /// The seconds within which grid and steps were refined, if they were.
             refined_within: Option<f64>,
+            /// Whether the material has no damping of its own.
+            undamped: bool,
         } = "inaccurate",
         /// Runs on two grids that part.
         #[error(

@@ -12,7 +12,9 @@ use crate::figure::scenario::{COORDINATE_NAMES, QuantityLabel, name_with_unit};
 use crate::report::numbers::{format_error_bound, format_four_digits, round_to_error};
 use glam::{DVec2, DVec3};
 use leafdyn::relax::{Equilibrium, Sensitivity};
+use leafdyn::scenario::units::LENGTH;
 use leafdyn::scenario::{Scenario, Units};
+use leafdyn::study::ParameterKeys;
 
 /// Sizes of the rows of bars, in pixels.
 struct BarLayout {
@@ -43,10 +45,10 @@ const LAYOUT: BarLayout = BarLayout {
 };
 
 /// Values are shown to this part of them.
-const SHOWN_VALUE_PRECISION: f64 = 5e-3;
+const SHOWN_VALUE_PRECISION: f64 = 5e-4;
 
 /// By how much each number changes: this part of it or, if it is zero, of the largest of its list or
-/// profile, and of its unit if all are zero.
+/// profile, and if all are zero of the longest vein, of lengths, or of its unit.
 const RELATIVE_CHANGE: f64 = 0.01;
 
 /// What a change of one number of the scenario does.
@@ -56,11 +58,16 @@ struct SensitivityRow {
     change: DVec3,
     /// Bound on the error of each component.
     error: f64,
+    /// Whether the number is zero and changes by a part of something else: its effect cannot be compared.
+    is_zero: bool,
 }
 
 impl SensitivityRow {
-    /// The row of a number of a list or profile whose largest has this magnitude.
-    fn from_sensitivity(found: &Sensitivity, largest: f64, units: &Units) -> Self {
+    /// The row of a number of a list or profile whose largest has this magnitude, of a leaf whose longest vein has this length.
+    fn from_sensitivity(found: &Sensitivity, largest: f64, longest: f64, units: &Units) -> Self {
+        let keys: Result<ParameterKeys, _> = found.key.parse();
+        let is_length = keys.is_ok_and(|keys| keys.dimension() == LENGTH);
+        let size = if is_length { longest } else { 1.0 };
         let number = QuantityLabel::from_keys(&found.key, units);
         let unit = number.unit.map_or(String::new(), |unit| format!(" {unit}"));
         let hundredth_of = |value: f64| {
@@ -73,8 +80,8 @@ impl SensitivityRow {
                 (factor, format!("0, {by}"))
             }
             0.0 => (
-                RELATIVE_CHANGE,
-                format!("0, by {}{unit}", format_four_digits(RELATIVE_CHANGE)),
+                RELATIVE_CHANGE * size,
+                format!("0, by {}{unit}", format_four_digits(RELATIVE_CHANGE * size)),
             ),
             value => hundredth_of(value),
         };
@@ -92,6 +99,7 @@ impl SensitivityRow {
             change_text: by,
             change: factor * change,
             error: factor.abs() * error.unwrap_or(0.0),
+            is_zero: found.value == 0.0,
         }
     }
 
@@ -120,9 +128,15 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     let units = &scenario.units;
     let mut rows: Vec<SensitivityRow> = found
         .iter()
-        .map(|it| SensitivityRow::from_sensitivity(it, largest_beside(found, it), units))
+        .map(|it| {
+            let largest = largest_beside(found, it);
+            SensitivityRow::from_sensitivity(it, largest, leaf.shape.longest(), units)
+        })
         .collect();
-    rows.sort_by(|a, b| b.change_length().total_cmp(&a.change_length()));
+    rows.sort_by(|a, b| {
+        let by_effect = b.change_length().total_cmp(&a.change_length());
+        a.is_zero.cmp(&b.is_zero).then(by_effect)
+    });
     rows.truncate(LAYOUT.most_rows);
     let reaction = found.iter().any(|found| found.reaction.is_some());
     let (what, unit) = match reaction {
@@ -134,7 +148,13 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
         false => "what each number does to the tip",
     };
     let name = format!("{}: {name}", leaf.scenario);
-    let mut notes = vec!["every number changed by a hundredth, largest effect first".to_string()];
+    let zeros = match rows.iter().any(|row| row.is_zero) {
+        true => ", those that are 0 below",
+        false => "",
+    };
+    let mut notes = vec![format!(
+        "every number changed by a hundredth, largest effect first{zeros}"
+    )];
     let error = rows.iter().map(|row| row.error).fold(0.0, f64::max);
     if error > 0.0 {
         notes.push(format!(

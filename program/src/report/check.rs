@@ -4,9 +4,9 @@ use crate::report::document::{
     ReportedResult, check_verdict_phrase, equilibrium_kind, shooting_method_name,
 };
 use crate::report::numbers::{
-    duration_text, format_as_accurate, format_error_bound, format_position, grids_text,
-    negative_eigenvalues_text, number_in_unit, position_decimals, position_error_text,
-    upper_bound_text, veins_text,
+    duration_text, format_as_accurate, format_error_bound, grids_text, negative_eigenvalues_text,
+    number_in_unit, position_decimals, position_error_text, tips_text, upper_bound_text,
+    veins_text,
 };
 use crate::report::relax::{doubt_with_option, equilibrium_phrase};
 use crate::report::table::{LabelledLines, label_first_line};
@@ -75,15 +75,11 @@ fn method_lines(check: &Check, units: &Units) -> LabelledLines {
         format!("{found} in {}", duration_text(shot.wall_seconds))
     });
     lines.push(("shooting", shot.unwrap_or_else(|| "not tried".into())));
-    let place = |tip: &DVec3| {
-        let tip = format_position(tip.to_array(), position_decimals(relaxed));
-        number_in_unit(tip, units, LENGTH)
-    };
-    if let [tip] = relaxed.tips.as_slice() {
-        lines.push(("tip", format!("{} relaxed", place(tip))));
-        if let Some([tip]) = check.shot.as_ref().map(|shot| shot.tips.as_slice()) {
-            lines.push(("", format!("{} by shooting", place(tip))));
-        }
+    let places = |tips: &[DVec3]| tips_text(tips, position_decimals(relaxed), units);
+    if let Some(tips) = places(&relaxed.tips) {
+        lines.push(("tip", format!("{tips} relaxed")));
+        let shot = check.shot.as_ref().and_then(|shot| places(&shot.tips));
+        lines.extend(shot.map(|tips| ("", format!("{tips} by shooting"))));
     }
     let digits =
         |energy: f64| number_in_unit(format_as_accurate(relaxed, energy, energy), units, ENERGY);

@@ -597,13 +597,8 @@ fn equilibrium_line(number: usize, found: &FoundEquilibrium, units: &Units) -> S
     let leaf = &found.equilibrium;
     let index = leaf.stability.negative_eigenvalues;
     let stability = index.map_or("of unknown stability".into(), stability_phrase);
-    let tip = match &leaf.tips[..] {
-        [tip] => {
-            let tip = format_position(tip.to_array(), position_decimals(leaf));
-            format!(", tip {}", number_in_unit(tip, units, LENGTH))
-        }
-        _ => String::new(),
-    };
+    let tips = tips_text(&leaf.tips, position_decimals(leaf), units);
+    let tip = tips.map_or(String::new(), |tips| format!(", tip {tips}"));
     let within = match leaf.accuracy.error_estimate {
         Some(error) => format!(", within {}", position_error_text(error, units)),
         None => String::new(),

@@ -9,7 +9,7 @@ use crate::report::table::{LabelledLines, label_first_line};
 use leafdyn::numbers::{format_two_digits, larger, largest};
 use leafdyn::scenario::units::{DAMPING, ENERGY, LENGTH, TIME, VELOCITY};
 use leafdyn::scenario::{MotionStart, Units};
-use leafdyn::simulate::{LandingRecord, Record, SchemeReason};
+use leafdyn::simulate::{LandingRecord, OutputSample, Record, SchemeReason};
 
 /// What the rounding of many steps leaves of the largest energy in the others.
 const ENERGY_ROUNDING: f64 = 1e-13;
@@ -50,6 +50,7 @@ impl ReportedResult for Record {
         };
         let tips = tips_text(&self.tips, decimals, units);
         lines.extend(tips.map(|tips| ("tip", tips)));
+        lines.extend(farthest_tip_line(self, units).map(|line| ("farthest", line)));
         lines.push(("end", late_motion_line(self, units)));
         lines.push(("error", tip_error_line(self, units)));
         lines.push(("speed", speed_line(self)));
@@ -159,6 +160,21 @@ fn landing_lines(record: &Record, units: &Units) -> Vec<String> {
     let off = in_unit(format_error_bound(off));
     let damped = format!("damped until the end {damped}, within {off} by the balance");
     record.landings.iter().map(line).chain([damped]).collect()
+}
+
+/// How far the tip, or the mean of free ones, was from where it began at the output at which it was farthest; none of a
+/// leaf that does not move.
+fn farthest_tip_line(record: &Record, units: &Units) -> Option<String> {
+    let start = record.moments.first()?.tip;
+    let away = |moment: &&OutputSample| moment.tip.distance(start);
+    let most = (record.moments.iter()).max_by(|a, b| away(a).total_cmp(&away(b)))?;
+    let error = most.error.unwrap_or(0.0);
+    let distance = round_to_error(away(&most), error);
+    (distance > 0.0).then(|| {
+        let distance = number_in_unit(format_five_digits(distance), units, LENGTH);
+        let time = number_in_unit(format_five_digits(most.time), units, TIME);
+        format!("the tip {distance} from where it began, at t = {time}: of all outputs")
+    })
 }
 
 /// Whether the leaf still moves at the end.

@@ -12,7 +12,7 @@ use crate::report::table::{
 };
 use glam::DVec3;
 use leafdyn::scenario::Units;
-use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, LENGTH, RATE};
+use leafdyn::scenario::units::{FORCE, FORCE_PER_LENGTH, RATE};
 use leafdyn::study::{
     BoundaryCurve, BoundaryMap, BoundaryPoint, BranchEnd, BranchingKind, CorrectorFailure,
     ForceDisplacementLine, PointKind, StabilityBoundary, Trace, TraceBranch, TracePoint,
@@ -213,14 +213,14 @@ pub fn error_location_words(trace: &Trace) -> &'static str {
 
 fn point_values_text(trace: &Trace, point: &TracePoint) -> String {
     let stability = point_stability_phrase(point);
-    let tip = match &point.tips[..] {
-        [tip] if point.reaction.is_none() => {
+    let tip = match point.tips.first().filter(|_| point.reaction.is_none()) {
+        Some(tip) => {
             let error = point.error.unwrap_or(DEFAULT_TIP_ERROR * tip.length());
             let decimals = decimals_for_error(error.max(ROUNDING_OF_LENGTHS * tip.length()));
-            let tip = numbers::format_position(tip.to_array(), decimals);
-            format!(", tip {}", number_in_unit(tip, &trace.units, LENGTH))
+            let tips = numbers::tips_text(&point.tips, decimals, &trace.units);
+            tips.map_or(String::new(), |tips| format!(", tip {tips}"))
         }
-        _ => String::new(),
+        None => String::new(),
     };
     let text = |force: &DVec3| {
         let error = trace.tolerance * force.length();

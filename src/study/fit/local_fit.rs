@@ -421,10 +421,10 @@ fn fit_remarks(stats: &FitStatistics, end: &GaussNewtonOutcome) -> Vec<FitRemark
 
 /// Fewer data of a column do not tell how it scatters, nor do residuals below this part of the leaf's length, to which
 /// equilibria are known.
-const FEWEST_SCATTERED_DATA: usize = 4;
+const FEWEST_SCATTERED_DATA: usize = 3;
 const SMALLEST_SCATTER: f64 = 1e-6;
 
-/// Columns whose residuals differ by a larger factor do not have one standard deviation: of four data each, that of
+/// Columns whose residuals differ by a larger factor do not have one standard deviation: of three data each, that of
 /// equal ones differs so much in one of ten thousand cases.
 const LARGEST_SCATTER_RATIO: f64 = 30.0;
 
