@@ -25,8 +25,11 @@ pub fn format_error_bound(bound: f64) -> String {
     format!("{mantissa:.1}×10{}", superscript(exponent))
 }
 
-/// A positive number with two digits, as in `0.87`, `2100` and `2.8×10⁷`.
+/// A number with two digits, as in `0.87`, `2100` and `2.8×10⁷`; 0 as it is.
 pub fn format_two_digits(number: f64) -> String {
+    if number == 0.0 {
+        return "0".into();
+    }
     let rounded = format!("{number:.1e}");
     match rounded.split_once('e') {
         Some((digits, power)) if !(1e-3..1e4).contains(&number.abs()) => match power.parse() {
@@ -108,6 +111,7 @@ mod tests {
         let wanted = ["0.87", "2100", "2.8×10⁷", "0.1", "10000", "3.0×10⁻⁷", "-12"];
         assert_eq!(numbers, wanted);
         assert_eq!(format_two_digits(f64::INFINITY), "inf");
+        assert_eq!(format_two_digits(0.0), "0");
     }
 }
 

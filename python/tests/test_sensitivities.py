@@ -90,7 +90,7 @@ def test_all_numbers_and_entries_of_lists() -> None:
     slope = (ends[1] - ends[0]) / (2 * step)
     assert np.abs(slope - alone.sensitivities["leaf.fan[2]"].tip).max() < 1e-5
     # A word has no entries.
-    with pytest.raises(ValueError, match="leaf.fan: is 'paper' in the scenario: write its numbers there"):
+    with pytest.raises(ValueError, match='leaf.fan: is "paper" in the scenario: write its numbers there'):
         leafdyn.sensitivities(fan(3), "leaf.fan")
     # Where points are is no number by which a leaf changes smoothly.
     assert not any(".at" in key for key in leafdyn.sensitivities(leafdyn.example("across"), "all", modes=0).sensitivities)
@@ -132,7 +132,7 @@ def test_they_are_a_table(tmp_path: Path) -> None:
 
 def test_their_table_has_units() -> None:
     pytest.importorskip("pandas")
-    units = {"length": "cm", "force": "N", "time": "s"}
+    units = {"length": "cm", "force": "N"}
     leaf = leafdyn.sensitivities({**fan(2), "units": units}, ["load.gravity[2]"])
     attrs = leaf.sensitivities.to_pandas().attrs
     assert attrs["scenario"] == "fan"

@@ -219,7 +219,7 @@ def test_rows_that_are_given_otherwise_say_how() -> None:
     with pytest.raises(leafdyn.ScenarioError, match="unknown key specimen.*what is no key belongs into the index: set_index$"):
         leafdyn.sweep(fan(2), named)
     assert leafdyn.sweep(fan(2), named.set_index("specimen"), "tip_z").index.tolist() == ["a", "b"]
-    apart = {("stiffness.bending_1", "stiffness.bending_2"): [(1.0, 2.0, 1.0), (2.0, 1.0)]}
+    apart = {("stiffness.bending_2", "stiffness.bending_3"): [(1.0, 2.0), (2.0, 1.0)]}
     with pytest.raises(leafdyn.ScenarioError, match="values of their own are columns of a DataFrame, a row for each leaf$"):
         leafdyn.sweep(fan(3), apart, on_error="raise")
 

@@ -149,11 +149,11 @@ pub fn draw(leaf: &Equilibrium, scenario: &Scenario) -> Drawing {
     };
     let name = format!("{}: {name}", leaf.scenario);
     let zeros = match rows.iter().any(|row| row.is_zero) {
-        true => ", those that are 0 below",
+        true => ", zeros below",
         false => "",
     };
     let mut notes = vec![format!(
-        "every number changed by a hundredth, largest effect first{zeros}"
+        "each changed by a hundredth, largest effect first{zeros}"
     )];
     let error = rows.iter().map(|row| row.error).fold(0.0, f64::max);
     if error > 0.0 {

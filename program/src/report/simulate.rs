@@ -173,7 +173,11 @@ fn farthest_tip_line(record: &Record, units: &Units) -> Option<String> {
     (distance > 0.0).then(|| {
         let distance = number_in_unit(format_five_digits(distance), units, LENGTH);
         let time = number_in_unit(format_five_digits(most.time), units, TIME);
-        format!("the tip {distance} from where it began, at t = {time}: of all outputs")
+        let tip = match record.joined {
+            true => "the tip",
+            false => "the tips on average",
+        };
+        format!("{tip} {distance} from the beginning, at t = {time}, of all outputs")
     })
 }
 

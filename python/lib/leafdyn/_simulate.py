@@ -44,8 +44,8 @@ def simulate(
         method also the local error of a step on the first grid.
     time_limit
         Seconds after which no finer run begins and the one that is under way ends: then the motion is that of the last run
-        that came to its end, or of the first as far as it came, whose ``outcome`` is ``"interrupted"``. A run on half as
-        many segments, with which the first is compared, comes before it and keeps nothing.
+        that came to its end, or of the first as far as it came, whose ``outcome`` is ``"interrupted"``. The first is on half
+        as many segments, where grids are refined, and the next one is compared with it.
 
     Returns
     -------
