@@ -151,6 +151,9 @@ def test_keys_in_a_tuple_take_the_same_value() -> None:
     assert numbers(together) == numbers(leafdyn.fit(PULL, measured("pull.csv"), [AXIAL, "+".join(shear)], set=known))
     bound = leafdyn.fit(PULL, measured("pull.csv"), {AXIAL: None, shear: (1.0, 1e4)}, set=known)
     assert list(bound.parameters) == list(together.parameters)
+    name = "+".join(shear)
+    held = together.profile(name, [together.values[name]])
+    assert held.chi_squared[0] == pytest.approx(together.chi_squared, rel=1e-6)
     with pytest.raises(TypeError, match=r"free: \(3, 4\): must be a key"):
         leafdyn.fit(PULL, measured("pull.csv"), [(3, 4)], set=known)
 

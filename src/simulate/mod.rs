@@ -66,6 +66,8 @@ pub struct Simulation {
     start: Option<MotionStart>,
     /// Speed of the fastest tip at the last output.
     tip_speed: f64,
+    /// Estimated steps of the semi-implicit method where no other moves the leaf.
+    forecast: Option<f64>,
     stable: Option<StableStep>,
     step: Option<f64>,
     method: Box<dyn TimeIntegrator + Send>,
@@ -197,6 +199,14 @@ impl Simulation {
                 SchemeChoice::cheaper_method(cost, other)
             }
         };
+        let only_method = matches!(
+            choice.reason,
+            SchemeReason::RigidRods | SchemeReason::MassesOffAxis
+        );
+        let forecast = (only_method && options.step.is_none() && physics.clamped()).then(|| {
+            let most = f64::INFINITY;
+            choice::semi_implicit_cost(&discrete, &physics, &state, tolerance, most).steps
+        });
         if choice.scheme == Scheme::SemiImplicit && !physics.clamped() {
             return Err(SimulationError::Held { obstacle });
         }
@@ -234,6 +244,7 @@ impl Simulation {
         let simulation = Simulation {
             start: Some(motion_start(&leaf)),
             tip_speed: 0.0,
+            forecast,
             leaf,
             choice,
             doubts: doubt
@@ -275,12 +286,10 @@ impl Simulation {
     pub fn expected(&self) -> Option<(f64, f64)> {
         let duration = self.physics.times().duration;
         let left = (duration * self.physics.time_unit - self.time()).max(0.0);
-        let steps = match (self.step, self.choice.costs) {
-            (Some(step), _) => left / step,
-            (None, Some([_, estimated])) => {
-                estimated.steps * left / (duration * self.physics.time_unit)
-            }
-            (None, None) => return None,
+        let estimated = self.choice.costs.map(|[_, estimated]| estimated.steps);
+        let steps = match self.step {
+            Some(step) => left / step,
+            None => estimated.or(self.forecast)? * left / (duration * self.physics.time_unit),
         };
         Some((steps, steps * self.seconds_of_a_step()))
     }

@@ -246,6 +246,8 @@ class Trace(Table, Viewed):
         if show is None:
             varying = on_grips or (REACTION if "reaction_x" in shown else TIP)
             show = max(reversed(varying), key=lambda name: float(np.ptp(table[shown[name]])))
+        # As in tables, too.
+        show = next((name for name, column in shown.items() if column == show), show)
         if show not in shown:
             raise ValueError(f"show = {show!r}: must be one of {', '.join(shown)}")
         column = shown[show]

@@ -115,10 +115,12 @@ class Asked:
         """The same with one of its free numbers held at a value."""
         given = {text.partition("=")[0]: text for text in self.keys}
         others = [given.get(name, name) for name in every if name != key]
-        if others and not key.startswith("offset:"):
-            return replace(self, scenario=Scenario(self.scenario, {key: value}), keys=others)
+        # Keys joined by + take the same value.
+        numbers = {} if key.startswith("offset:") else dict.fromkeys(key.split("+"), value)
+        scenario = Scenario(self.scenario, numbers) if numbers else self.scenario
+        if others and numbers:
+            return replace(self, scenario=scenario, keys=others)
         # It alone is free, or no number of the scenario: between bounds that are next to each other.
-        scenario = self.scenario if key.startswith("offset:") else Scenario(self.scenario, {key: value})
         # What was scaled already has the factor one.
         here = 1.0 if key.startswith("scale:") else value
         low, high = sorted((here * (1.0 - HELD), here * (1.0 + HELD))) if here else (-HELD, HELD)

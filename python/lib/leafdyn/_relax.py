@@ -418,8 +418,9 @@ def modes(
     Returns
     -------
     Equilibrium
-        With ``eigenvalues``, ``eigenvalue_errors``, ``frequencies``, ``effective_masses``, ``mode_displacements`` and
-        ``mode_rotations``; without a potential with ``growth_rates`` in place of eigenvalues, and
+        With ``eigenvalues``, ``eigenvalue_errors``, ``frequencies``, ``effective_masses`` (how much of the leaf's mass a base
+        that is shaken along x, y or z moves in each mode), ``mode_displacements`` (of which the largest is the length of
+        the longest rod) and ``mode_rotations``; without a potential with ``growth_rates`` in place of eigenvalues, and
         ``mode_later_displacements`` and ``mode_later_rotations``.
 
     Examples
