@@ -514,8 +514,7 @@ pub fn implausible_properties(scenario: &Scenario, leaf: &Equilibrium) -> Vec<Eq
         all.extend(inversion_doubt(rods, stations).or_else(strained));
     }
     all.extend(turned_from_wind(scenario, rods, stations));
-    let longest = rods.iter().map(|rod| rod.length).fold(0.0, f64::max);
-    let shift = scenario.place_shift * longest;
+    let shift = scenario.place_shift * leaf.shape.longest();
     all.extend(EquilibriumDoubt::about_places(
         shift,
         leaf.accuracy.error_estimate,
