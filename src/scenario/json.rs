@@ -439,13 +439,11 @@ impl Scenario {
 
     /// Whether the rotary inertia is that of the densities and the sections, or the strips of a blade.
     fn rotary_inertia_follows_from_source(&self, sections: Option<&SerializedSections>) -> bool {
-        let source = match (&self.blade, sections) {
-            (Some(blade), _) => StiffnessSource::from_blade(blade.clone()),
-            (None, Some(it)) => StiffnessSource::Sections(it.sections.to_vec()),
-            (None, None) => return false,
-        };
+        let gives_stiffnesses = self.blade.is_some() || sections.is_some();
         let dynamics = &self.dynamics;
-        source.rotary_inertia(&dynamics.density).as_ref() == Some(&dynamics.rotary_inertia)
+        let source = self.stiffness_source().filter(|_| gives_stiffnesses);
+        let inertia = source.and_then(|source| source.rotary_inertia(&dynamics.density));
+        inertia.as_ref() == Some(&dynamics.rotary_inertia)
     }
 }
 

@@ -97,7 +97,8 @@ pub(super) fn cheaper_motions(
             CheaperChange::Segments(count) => options.segments = Some(count),
             CheaperChange::Tolerance(tolerance) => options.tolerance = Some(tolerance),
         }
-        let changed = Simulation::new(&scenario, &options);
+        let local_error = options.tolerance.unwrap_or(scenario.tolerance);
+        let changed = Simulation::with_local_error(&scenario, &options, local_error, true);
         // Where there is no such motion the change is none.
         let expected = changed.ok().and_then(|changed| changed.expected());
         if let Some((_, less)) = expected

@@ -99,14 +99,16 @@ impl Simulation {
     /// one on which it does.
     pub fn new(scenario: &Scenario, options: &Options) -> Result<Self, SimulationError> {
         let local_error = options.tolerance.unwrap_or(scenario.tolerance);
-        Simulation::with_local_error(scenario, options, local_error)
+        Simulation::with_local_error(scenario, options, local_error, false)
     }
 
-    /// As [`Simulation::new`], with this local error of semi-implicit steps; the start is as accurate as there.
+    /// As [`Simulation::new`], with this local error of semi-implicit steps; the start is as accurate as there. With
+    /// `forecast` the steps are estimated, too, where one method alone moves the leaf: a fraction of a second.
     fn with_local_error(
         scenario: &Scenario,
         options: &Options,
         local_error: f64,
+        forecast: bool,
     ) -> Result<Self, SimulationError> {
         let tolerance = options.tolerance.unwrap_or(scenario.tolerance);
         let from =
@@ -116,7 +118,7 @@ impl Simulation {
             ..options.clone()
         };
         loop {
-            match Simulation::with_initial_state(scenario, &on_grid, &from) {
+            match Simulation::with_initial_state(scenario, &on_grid, &from, forecast) {
                 Err(SimulationError::NoRest { segments, .. })
                     if options.segments.is_none() && 2 * segments <= FINEST_START_SEGMENTS =>
                 {
@@ -135,7 +137,7 @@ impl Simulation {
         options: &Options,
     ) -> Result<Self, SimulationError> {
         let from = |leaf: &Leaf, grid: &Grid| Ok(follower.state_on(leaf, grid));
-        let begun = Simulation::with_initial_state(scenario, options, &from)?;
+        let begun = Simulation::with_initial_state(scenario, options, &from, false)?;
         Ok(Simulation {
             start: None,
             ..begun
@@ -164,6 +166,7 @@ impl Simulation {
         scenario: &Scenario,
         options: &Options,
         state: &dyn Fn(&Leaf, &Grid) -> Result<State, SimulationError>,
+        forecast: bool,
     ) -> Result<Self, SimulationError> {
         if let Some(found) = options.step
             && !(found.is_finite() && found > 0.0)
@@ -203,7 +206,8 @@ impl Simulation {
             choice.reason,
             SchemeReason::RigidRods | SchemeReason::MassesOffAxis
         );
-        let forecast = (only_method && options.step.is_none() && physics.clamped()).then(|| {
+        let unknown = only_method && options.step.is_none() && physics.clamped();
+        let forecast = (forecast && unknown).then(|| {
             let most = f64::INFINITY;
             choice::semi_implicit_cost(&discrete, &physics, &state, tolerance, most).steps
         });

@@ -223,7 +223,7 @@ impl Refinement {
             ),
             None => scenario.tolerance,
         };
-        let first = Simulation::with_local_error(scenario, options, local_error)?;
+        let first = Simulation::with_local_error(scenario, options, local_error, true)?;
         let cheaper = match first.expected() {
             Some((_, seconds)) if seconds > COSTLY_SECONDS => {
                 cheaper_motions(scenario, options, &first, seconds)
@@ -471,7 +471,7 @@ impl Refinement {
         let from = |leaf: &Leaf, grid: &Grid| {
             start::start_state(leaf, grid, start_tolerance, options.limit.clone())
         };
-        Simulation::with_initial_state(&self.scenario, &options, &from)
+        Simulation::with_initial_state(&self.scenario, &options, &from, false)
     }
 
     /// With steps of this length or, by the explicit method, the longest stable ones if they are

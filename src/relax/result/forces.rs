@@ -653,6 +653,7 @@ impl Stresses {
         }
     }
 }
+
 /// Parts of the width of the drag that flat sections may turn to the wind before that is doubtful.
 const FACES_IN_WIND: RangeInclusive<f64> = 0.75..=1.33;
 
